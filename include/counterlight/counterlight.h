@@ -1,0 +1,16 @@
+/* counterlight: measure how a room carries light, invert it, and project the picture that makes the wanted one appear.
+ */
+#ifndef COUNTERLIGHT_H
+#define COUNTERLIGHT_H
+
+#include "counterlight/acquire.h"
+#include "counterlight/device.h"
+#include "counterlight/image.h"
+#include "counterlight/rig.h"
+#include "counterlight/scene.h"
+#include "counterlight/solve.h"
+#include "counterlight/station.h"
+#include "counterlight/status.h"
+#include "counterlight/transport.h"
+
+#endif

@@ -1,0 +1,119 @@
+/* Inversion: the drive x in 0..1 that makes T x come nearest to a wanted observation.
+ *
+ * With F = diag(T), S = T F^-1 and R = S - I (Bai et al. 2010, eq. 5, 12) the methods solve S l = b, l = F x, per
+ * colour channel. Dark cells (F not above the noise, or not finite) take no part: their drive is fixed at 0 and their
+ * rows are dropped. Arrays over a channel set are channel after channel. */
+#ifndef COUNTERLIGHT_SOLVE_H
+#define COUNTERLIGHT_SOLVE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "counterlight/image.h"
+#include "counterlight/status.h"
+#include "counterlight/transport.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What is known of T before any target: made once per transport. */
+typedef struct clt_certificate clt_certificate;
+
+typedef struct clt_channel_certificate {
+  size_t lit, dark;               /* cells that take part, cells that do not */
+  double radius_low, radius_high; /* Collatz-Wielandt bounds: radius_low <= rho(R) <= radius_high */
+  double norm_high;               /* upper bound of ||R||_2 from sqrt(||R||_1 ||R||_inf) */
+  double reciprocity; /* defect of the flux-scaled S: ||S W - (S W)'|| / ||S W||, off the diagonal, by probes */
+  double white;       /* median over lit cells of F: the radiance that white means by default */
+} clt_channel_certificate;
+
+/* Bounds by at most 8 power steps from x = 1 with R clipped at 0 (NUMERICS section 1), flux weights w such that
+ * S diag(w) is nearest to symmetric, dark cells from F and the transport's sigma. */
+CLT_PUBLIC clt_status clt_certify(const clt_transport *transport, clt_certificate **out, clt_error *error);
+CLT_PUBLIC void clt_certificate_destroy(clt_certificate *certificate);
+CLT_PUBLIC const clt_channel_certificate *clt_certificate_channel(const clt_certificate *certificate, int channel);
+/* lit[i] != 0 where cell i of the channel takes part; cols values, owned by the certificate. */
+CLT_PUBLIC const unsigned char *clt_certificate_lit(const clt_certificate *certificate, int channel);
+/* F = diag(T) of the channel (cols values), and the flux weights w (cols values, mean 1 over lit cells). */
+CLT_PUBLIC const double *clt_certificate_first_bounce(const clt_certificate *certificate, int channel);
+CLT_PUBLIC const double *clt_certificate_flux(const clt_certificate *certificate, int channel);
+
+typedef struct clt_solve_options {
+  const char *method;  /* a name from clt_method_name, or "auto" (NULL means "auto") */
+  double tolerance;    /* relative residual ||T x - b|| / ||b|| over lit rows to stop at, > 0; 0 means 1e-4. "bounded":
+                          the projected gradient's norm relative to its start */
+  int iteration_limit; /* > 0; 0 means 1000 */
+  double deadline_s;   /* wall time after which the best drive so far is returned; <= 0 means none */
+  const double *start; /* warm start: channels * cols drive values, or NULL for zero */
+} clt_solve_options;
+
+typedef struct clt_solve_result {
+  char method[24];    /* the method that gave the answer */
+  char reason[200];   /* why this one, in one sentence */
+  int iterations;     /* the most that any channel took */
+  double residual;    /* ||T x - b|| / ||b|| over lit rows of every channel, of the x that is returned */
+  double seconds;     /* wall time */
+  bool converged;     /* false where the iteration limit or the deadline came first */
+  size_t curve_count; /* residual after iteration k, k = 0.. (channels together), for convergence plots */
+  double curve[256];
+} clt_solve_result;
+
+/* The names of the methods, in order: index 0.. until NULL ("jacobi", "pcg", "gmres", "bounded"). */
+CLT_PUBLIC const char *clt_method_name(size_t index);
+/* One sentence on what the method is and when it serves. */
+CLT_PUBLIC const char *clt_method_summary(size_t index);
+
+/* Solves for drive (channels * cols values) with wanted (channels * rows values: target less black).
+ * "bounded" and "auto" keep 0 <= drive <= 1; the other methods solve the unbounded system and leave drive unclipped.
+ * A method that the certificate shows to diverge is refused (CLT_BAD_INPUT with the reason); one that diverges in spite
+ * of its certificate is detected and replaced, which method and reason tell. CLT_BAD_INPUT for a method that does not
+ * exist (the message lists those that do), options out of range, or a target that is not finite. */
+CLT_PUBLIC clt_status clt_solve(const clt_transport *transport, const clt_certificate *certificate,
+                                const double *wanted, const clt_solve_options *options, double *drive,
+                                clt_solve_result *result, clt_error *error);
+
+/* What a compensation is asked for. */
+typedef enum clt_white_kind { CLT_WHITE_AUTO, CLT_WHITE_FEASIBLE, CLT_WHITE_VALUE } clt_white_kind;
+typedef struct clt_white {
+  clt_white_kind kind; /* AUTO: median F per channel; FEASIBLE: the largest that every lit cell can reach */
+  double value;        /* CLT_WHITE_VALUE: radiance of white, > 0 */
+} clt_white;
+/* Reads "auto", "feasible" or a positive number. */
+CLT_PUBLIC clt_status clt_white_parse(const char *text, clt_white *white, clt_error *error);
+
+/* What a drive will look like and how good it can get. Errors are relative RMS over lit cells of every channel,
+ * ||y - target|| / ||target||, in linear light. */
+typedef struct clt_compensation {
+  clt_solve_result solve;
+  double white[CLT_CHANNELS_MAX]; /* radiance that 1.0 in the picture stands for */
+  double error_before;            /* drive = picture, after the best single brightness factor */
+  double error_after;             /* predicted for the drive that is returned */
+  double error_limit;             /* the least that any drive in 0..1 can reach; < 0 where it was not asked for */
+  double clipped_fraction;        /* lit cells whose drive is at 0 or 1 */
+} clt_compensation;
+
+/* The drive in 0..1 that makes `picture` (linear, the transport's width, height and channels, values >= 0) appear:
+ * target = white * picture, wanted = target - b0. drive is initialised here. An unbounded method's answer is clipped to
+ * 0..1 before its error is taken. find_limit also solves the bounded problem to its optimum for error_limit. */
+CLT_PUBLIC clt_status clt_compensate(const clt_transport *transport, const clt_certificate *certificate,
+                                     const clt_image *picture, const clt_white *white, const clt_solve_options *options,
+                                     bool find_limit, clt_image *drive, clt_compensation *result, clt_error *error);
+
+/* The wanted radiance white * picture; target is initialised here, and white_value (channels values) is filled. */
+CLT_PUBLIC clt_status clt_target(const clt_transport *transport, const clt_certificate *certificate,
+                                 const clt_image *picture, const clt_white *white, clt_image *target,
+                                 double *white_value, clt_error *error);
+
+/* b0 + T drive; seen is initialised here. Needs rows = cols. */
+CLT_PUBLIC clt_status clt_predict(const clt_transport *transport, const clt_image *drive, clt_image *seen,
+                                  clt_error *error);
+
+/* ||gain * seen - target|| / ||target|| over lit cells; with best_gain the gain that makes it least, else gain 1. */
+CLT_PUBLIC double clt_appearance_error(const clt_certificate *certificate, const clt_image *seen,
+                                       const clt_image *target, bool best_gain);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,23 @@
+/* Files that are replaced as a whole: a reader sees the old content or the new, never half of it. */
+#ifndef CLT_BASE_FILE_H
+#define CLT_BASE_FILE_H
+
+#include <stddef.h>
+
+#include "counterlight/status.h"
+
+/* The temporary name under which the new content of path is written: same folder, ending kept (writers choose their
+ * format by it), unique to this process and call. temporary has room for CLT_PATH_MAX. */
+clt_status clt_file_begin(const char *path, char *temporary, clt_error *error);
+/* Syncs the temporary file, renames it over path and syncs the folder. On failure the temporary file is removed. */
+clt_status clt_file_commit(const char *temporary, const char *path, clt_error *error);
+/* Removes the temporary file after a failure. */
+void clt_file_abandon(const char *temporary);
+/* All three around one buffer. */
+clt_status clt_file_write(const char *path, const void *bytes, size_t size, clt_error *error);
+/* Joins a folder and a relative name; an absolute name stays as it is. out has room for CLT_PATH_MAX. */
+clt_status clt_file_join(const char *folder, const char *name, char *out, clt_error *error);
+/* The folder part of a path ("." where it has none). out has room for CLT_PATH_MAX. */
+void clt_file_folder(const char *path, char *out);
+
+#endif

@@ -1,0 +1,56 @@
+/* The commands of `counterlight`: one table entry each, one file a command or family of commands. */
+#ifndef CLT_CLI_COMMAND_H
+#define CLT_CLI_COMMAND_H
+
+#include <jansson.h>
+#include <stdbool.h>
+
+#include "counterlight/status.h"
+
+enum { CLI_OPTIONS_MAX = 16, CLI_POSITIONAL_MAX = 4 };
+
+/* Exit codes (contract: scripts rely on them). */
+enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_BAD_USAGE = 2 };
+
+/* One option of a command. --help, --json and -q/--quiet are known to every command and not listed. */
+typedef struct cli_option {
+  const char *name;     /* without the dashes; NULL ends the list */
+  char letter;          /* short form, or 0 */
+  const char *argument; /* name of its argument for --help; NULL: a flag */
+  const char *help;
+} cli_option;
+
+typedef struct cli_arguments {
+  bool json, quiet;
+  const char
+      *value[CLI_OPTIONS_MAX]; /* parallel to the command's options: the argument, "" for a flag, NULL if absent */
+  const char *positional[CLI_POSITIONAL_MAX];
+  int positional_count;
+} cli_arguments;
+
+typedef struct cli_command {
+  const char *name;
+  const char *synopsis; /* "T.h5 --target PIC -o OUT" */
+  const char *summary;  /* one line */
+  const cli_option *options;
+  int positional_least, positional_most;
+  /* Returns an exit code. What fails is said once, by cli_fail. */
+  int (*run)(const struct cli_command *command, const cli_arguments *arguments);
+} cli_command;
+
+/* The argument of the option called name, or NULL where it was not given. */
+const char *cli_value(const cli_command *command, const cli_arguments *arguments, const char *name);
+/* Reads a number option within low..high into *value (left as it is where the option is absent). */
+clt_status cli_number(const cli_command *command, const cli_arguments *arguments, const char *name, double low,
+                      double high, double *value, clt_error *error);
+
+/* Prints "counterlight NAME: message" on stderr; returns CLI_BAD_USAGE for CLT_BAD_INPUT, else CLI_FAILED. */
+int cli_fail(const cli_command *command, const clt_error *error);
+/* Prints one JSON document on stdout and frees it. Returns CLI_DONE, or CLI_FAILED where stdout cannot be written. */
+int cli_print_json(json_t *document);
+
+/* The commands that talk to a running daemon (client.c): status reacquire show watch snapshot hold resume reload. */
+extern const cli_command cli_command_status, cli_command_reacquire, cli_command_show, cli_command_watch,
+    cli_command_snapshot, cli_command_hold, cli_command_resume, cli_command_reload;
+
+#endif
