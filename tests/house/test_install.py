@@ -1,0 +1,75 @@
+"""Installs into a fresh folder and uses what is there: headers, library through pkg-config, programs, man pages, units."""
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+
+PROGRAM = r"""
+#include <counterlight/counterlight.h>
+#include <stdio.h>
+int main(void) {
+  clt_error error = {0};
+  clt_transport *transport = NULL;
+  if (clt_transport_create_dense(2, 1, 1, 2, &transport, &error) != CLT_OK) {
+    return 1;
+  }
+  float *entries = clt_transport_entries(transport, 0);
+  entries[0] = 1.0f, entries[1] = 0.25f, entries[2] = 0.5f, entries[3] = 1.0f;
+  double x[2] = {2, 4}, y[2];
+  clt_transport_apply(transport, 0, x, y);
+  printf("%g %g\n", y[0], y[1]);
+  clt_transport_destroy(transport);
+  return clt_curve_parse("no curve", &(clt_curve){0}, &error) == CLT_BAD_INPUT ? 0 : 2;
+}
+"""
+
+
+def run(*command, **options):
+    return subprocess.run(command, check=True, text=True, capture_output=True, **options).stdout
+
+
+def installed_files(build, root):
+    run("meson", "install", "-C", build, "--no-rebuild", "--destdir", root)
+    return sorted(str(p.relative_to(root)) for p in pathlib.Path(root).rglob("*") if not p.is_dir())
+
+
+def library_serves_a_program(build, root):
+    pc = next(pathlib.Path(root).rglob("counterlight.pc"))
+    environment = dict(os.environ, PKG_CONFIG_PATH=str(pc.parent), PKG_CONFIG_SYSROOT_DIR=root)
+    flags = run("pkg-config", "--cflags", "--libs", "counterlight", env=environment).split()
+    source, program = os.path.join(root, "use.c"), os.path.join(root, "use")
+    pathlib.Path(source).write_text(PROGRAM)
+    sanitize = [o for o in run("meson", "introspect", build, "--buildoptions").split('"') if o == "address,undefined"]
+    extra = ["-fsanitize=address,undefined"] if sanitize else []
+    run("cc", "-std=c17", "-Wall", "-Wextra", "-Werror", source, "-o", program, *flags, *extra)
+    libraries = next(pathlib.Path(root).rglob("libcounterlight.so")).parent
+    out = run(program, env=dict(os.environ, LD_LIBRARY_PATH=str(libraries), ASAN_OPTIONS="detect_leaks=0"))
+    assert out == "3 5\n", out
+    exported = run("nm", "-D", "--defined-only", str(libraries / "libcounterlight.so")).split("\n")
+    foreign = [l for l in exported if l and " T " in l and not l.split()[-1].startswith("clt_")]
+    assert not foreign, foreign
+
+
+def main():
+    build = sys.argv[1]
+    for tool in ("meson", "pkg-config", "cc", "nm"):
+        if shutil.which(tool) is None:
+            print(f"skipped: {tool} is not installed")
+            return 77
+    with tempfile.TemporaryDirectory() as root:
+        files = installed_files(build, root)
+        for wanted in ("bin/counterlight", "bin/counterlightd", "include/counterlight/counterlight.h",
+                       "man1/counterlight.1", "man8/counterlightd.8", "counterlight.service", "counterlight.socket",
+                       "simulated.cfg", "scenes/dihedral.cfg", "counterlight.pc"):
+            assert any(wanted in f for f in files), f"{wanted} is not installed: {files}"
+        headers = {p.name for p in pathlib.Path(sys.argv[0]).parents[2].glob("include/counterlight/*.h")}
+        installed = {os.path.basename(f) for f in files if f.endswith(".h")}
+        assert headers == installed, headers ^ installed
+        library_serves_a_program(build, root)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
