@@ -1,0 +1,116 @@
+"""PNG and EXR files made and read with zlib and struct alone, to judge the program's own reading and writing."""
+import struct
+import subprocess
+import sys
+import zlib
+
+import numpy as np
+
+SAMPLES = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # of a pixel, by PNG colour type
+
+
+def chunk(kind, content):
+    return struct.pack('>I', len(content)) + kind + content + struct.pack('>I', zlib.crc32(kind + content))
+
+
+def png(codes, colour_type, depth=8, extra=(), palette=None):
+    """A PNG of codes [height, width, samples]; extra chunks come before the data."""
+    height, width, _ = codes.shape
+    if depth == 16:
+        rows = codes.astype('>u2').tobytes()
+    elif depth == 8:
+        rows = codes.astype('u1').tobytes()
+    else:
+        bits = np.unpackbits(codes.astype('u1').reshape(height, width, 1), axis=2)[:, :, 8 - depth:]
+        rows = np.packbits(bits.reshape(height, -1), axis=1).tobytes()
+    stride = len(rows) // height
+    filtered = b''.join(b'\0' + rows[y * stride:(y + 1) * stride] for y in range(height))
+    header = struct.pack('>IIBBBBB', width, height, depth, colour_type, 0, 0, 0)
+    return (b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', header) + b''.join(extra)
+            + (chunk(b'PLTE', palette.astype('u1').tobytes()) if palette is not None else b'')
+            + chunk(b'IDAT', zlib.compress(filtered)) + chunk(b'IEND', b''))
+
+
+def paeth(a, b, c):
+    p = int(a) + int(b) - int(c)
+    distances = abs(p - a), abs(p - b), abs(p - c)
+    return (a, b, c)[distances.index(min(distances))]
+
+
+def unfilter(kind, row, above, step):
+    """PNG specification, section 9.2; row and above are lists of bytes."""
+    for i in range(len(row)):
+        a = row[i - step] if i >= step else 0
+        c = above[i - step] if i >= step else 0
+        row[i] = (row[i] + (0, a, above[i], (a + above[i]) // 2, paeth(a, above[i], c))[kind]) & 255
+    return row
+
+
+def read_png(path):
+    """The code values [height, width, samples] of an 8- or 16-bit PNG without interlacing, and its depth."""
+    data = open(path, 'rb').read()
+    assert data[:8] == b'\x89PNG\r\n\x1a\n'
+    at, packed, header = 8, b'', None
+    while at < len(data):
+        size, kind = struct.unpack('>I4s', data[at:at + 8])
+        content = data[at + 8:at + 8 + size]
+        assert struct.unpack('>I', data[at + 8 + size:at + 12 + size])[0] == zlib.crc32(kind + content)
+        header = struct.unpack('>IIBBBBB', content) if kind == b'IHDR' else header
+        packed += content if kind == b'IDAT' else b''
+        at += 12 + size
+    width, height, depth, colour_type, _, _, interlaced = header
+    assert depth in (8, 16) and colour_type != 3 and not interlaced
+    step = SAMPLES[colour_type] * depth // 8
+    flat, stride = zlib.decompress(packed), width * step + 1
+    rows, above = [], [0] * (stride - 1)
+    for y in range(height):
+        above = unfilter(flat[y * stride], list(flat[y * stride + 1:(y + 1) * stride]), above, step)
+        rows.append(above)
+    kind = '>u2' if depth == 16 else 'u1'
+    return np.frombuffer(bytes(sum(rows, [])), kind).reshape(height, width, -1).astype(int), depth
+
+
+def exr(image, kind):
+    """An uncompressed scan-line EXR (OpenEXR file layout) of image [channels, height, width], kind 'f2' or 'f4'."""
+    channels, height, width = image.shape
+    names = ['Y'] if channels == 1 else ['B', 'G', 'R']  # in alphabetical order
+    planes = image if channels == 1 else image[::-1]
+
+    def attribute(name, what, content):
+        return name + b'\0' + what + b'\0' + struct.pack('<I', len(content)) + content
+
+    listing = b''.join(n.encode() + b'\0' + struct.pack('<iB3xii', 1 if kind == 'f2' else 2, 0, 1, 1) for n in names)
+    window = struct.pack('<iiii', 0, 0, width - 1, height - 1)
+    head = (b'\x76\x2f\x31\x01' + struct.pack('<I', 2) + attribute(b'channels', b'chlist', listing + b'\0')
+            + attribute(b'compression', b'compression', b'\0') + attribute(b'dataWindow', b'box2i', window)
+            + attribute(b'displayWindow', b'box2i', window) + attribute(b'lineOrder', b'lineOrder', b'\0')
+            + attribute(b'pixelAspectRatio', b'float', struct.pack('<f', 1))
+            + attribute(b'screenWindowCenter', b'v2f', struct.pack('<ff', 0, 0))
+            + attribute(b'screenWindowWidth', b'float', struct.pack('<f', 1)) + b'\0')
+    rows = [planes[:, y].astype('<' + kind).tobytes() for y in range(height)]
+    begin = len(head) + 8 * height
+    offsets = [begin + y * (8 + len(rows[0])) for y in range(height)]
+    return (head + struct.pack('<%dQ' % height, *offsets)
+            + b''.join(struct.pack('<ii', y, len(row)) + row for y, row in enumerate(rows)))
+
+
+def srgb_decode(v):
+    """IEC 61966-2-1."""
+    return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
+
+
+def srgb_encode(light):
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def convert(*arguments):
+    """Runs the program under test, which this script was given: status, lines on stderr."""
+    done = subprocess.run([sys.argv[1], *map(str, arguments)], capture_output=True, timeout=60)
+    assert done.stdout == b'', done.stdout
+    return done.returncode, done.stderr.decode(errors='replace').splitlines()
+
+
+def converted(*arguments):
+    """Runs it where it must succeed, silently."""
+    outcome = convert(*arguments)
+    assert outcome == (0, []), (arguments, outcome)
