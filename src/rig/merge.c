@@ -1,0 +1,143 @@
+#include "rig/merge.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+
+#include "base/memory.h"
+
+/* A sample this near to full scale may be clipped. Leaving single samples out by their own value would favour the dark
+ * ones of a bright cell; so a whole exposure goes as soon as the mean of the cell's samples, whose noise is small,
+ * comes near, and the limit of a single sample then only meets hot pixels. */
+#define SAMPLE_LIMIT 0.98
+#define MEAN_LIMIT 0.95
+
+static void fill_tables(clt_merge *merge, const clt_curve *response) {
+  int top = (1 << merge->camera.bits) - 1;
+  double black = merge->camera.black_level, range = top - black, step = 1 / range;
+  for (int code = 0; code <= top; code++) {
+    double v = (code - black) / range;
+    /* The odd continuation below black keeps noise around zero unbiased. */
+    merge->light[code] = (float)(v < 0 ? -clt_curve_decode(response, -v) : clt_curve_decode(response, v));
+    double low = fmax(fabs(v) - step, 0), high = fmin(fabs(v) + step, 1);
+    merge->slope[code] = (float)((clt_curve_decode(response, high) - clt_curve_decode(response, low)) / (high - low));
+  }
+  merge->saturated = (float)(black + SAMPLE_LIMIT * range);
+  merge->full = (float)(black + MEAN_LIMIT * range);
+}
+
+clt_status clt_merge_init(clt_merge *merge, const clt_camera_info *camera, const clt_curve *response,
+                          const clt_footprints *footprints, int exposures, clt_error *error) {
+  size_t codes = (size_t)1 << camera->bits;
+  *merge = (clt_merge){
+      .camera = *camera,
+      .footprints = footprints,
+      .exposures = exposures,
+      .light = clt_alloc(codes, sizeof *merge->light),
+      .slope = clt_alloc(codes, sizeof *merge->slope),
+      .sums = clt_alloc((size_t)exposures * (size_t)camera->channels * footprints->cells, sizeof *merge->sums)};
+  if (merge->light == NULL || merge->slope == NULL || merge->sums == NULL) {
+    clt_merge_finish(merge);
+    return clt_fail(error, CLT_FAILED, "out of memory for merging %d exposures of %zu cells", exposures,
+                    footprints->cells);
+  }
+  fill_tables(merge, response);
+  return CLT_OK;
+}
+
+void clt_merge_finish(clt_merge *merge) {
+  free(merge->light);
+  free(merge->slope);
+  free(merge->sums);
+  *merge = (clt_merge){0};
+}
+
+static clt_merge_sum sum_footprint(const clt_merge *merge, const uint16_t *samples, const int32_t *pixel,
+                                   int64_t count) {
+  int channels = merge->camera.channels;
+  float light = 0, unsaturated = 0, raw = 0;
+  for (int64_t p = 0; p < count; p++) {
+    uint16_t code = samples[(size_t)pixel[p] * (size_t)channels];
+    raw += code;
+    if (code < merge->saturated) {
+      light += merge->light[code];
+      unsaturated += 1;
+    }
+  }
+  raw /= (float)count;
+  if (unsaturated == 0 || raw >= merge->full) {
+    return (clt_merge_sum){.raw = raw};
+  }
+  return (clt_merge_sum){.light = light / unsaturated, .count = unsaturated, .raw = raw};
+}
+
+void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame) {
+  const clt_footprints *footprints = merge->footprints;
+  int channels = merge->camera.channels;
+  clt_merge_sum *sums = merge->sums + (size_t)exposure * (size_t)channels * footprints->cells;
+  merge->seconds[exposure] = frame->exposure_s;
+#pragma omp parallel for schedule(static)
+  for (size_t i = 0; i < footprints->cells; i++) {
+    int64_t first = footprints->start[i], count = footprints->start[i + 1] - first;
+    for (int c = 0; c < channels; c++) {
+      sums[(size_t)c * footprints->cells + i] =
+          count > 0 ? sum_footprint(merge, frame->samples + c, footprints->pixel + first, count) : (clt_merge_sum){0};
+    }
+  }
+}
+
+/* Variance of the estimate of the rate by one exposure, were the rate e. */
+static double variance_at(const clt_merge *merge, const clt_merge_sum *sum, double t, double e) {
+  const clt_camera_info *camera = &merge->camera;
+  double read = camera->read_noise / camera->full_well;
+  double step = merge->slope[(int)(sum->raw + 0.5f)] / ((1 << camera->bits) - 1 - camera->black_level);
+  double sample = fmax(e, 0) * t / camera->full_well + read * read + step * step / 12;
+  return sample / (t * t * sum->count);
+}
+
+/* The rate e of one cell and channel (sums of successive exposures lie stride apart) and its variance. */
+static double merge_rate(const clt_merge *merge, const clt_merge_sum *sums, size_t stride, double *variance) {
+  double first = 0, longest = 0, bound = 0;
+  for (int k = 0; k < merge->exposures; k++) {
+    const clt_merge_sum *sum = &sums[(size_t)k * stride];
+    double t = merge->seconds[k];
+    if (sum->count > 0 && t > longest) {
+      longest = t;
+      first = sum->light / t;
+    }
+    bound = fmax(bound, merge->light[(int)(sum->raw + 0.5f)] / t);
+  }
+  if (longest == 0) {
+    *variance = INFINITY;
+    return bound;
+  }
+  double e = first, weights = 0;
+  for (int pass = 0; pass < 2; pass++) {
+    double weighted = 0;
+    weights = 0;
+    for (int k = 0; k < merge->exposures; k++) {
+      const clt_merge_sum *sum = &sums[(size_t)k * stride];
+      if (sum->count > 0) {
+        double w = 1 / variance_at(merge, sum, merge->seconds[k], e);
+        weighted += w * sum->light / merge->seconds[k];
+        weights += w;
+      }
+    }
+    e = weighted / weights;
+  }
+  *variance = 1 / weights;
+  return e;
+}
+
+void clt_merge_radiance(const clt_merge *merge, clt_image *radiance, clt_image *deviation) {
+  size_t cells = merge->footprints->cells, values = cells * (size_t)merge->camera.channels;
+  double responsivity = merge->camera.responsivity;
+#pragma omp parallel for schedule(static)
+  for (size_t i = 0; i < values; i++) {
+    bool seen = merge->footprints->start[i % cells + 1] > merge->footprints->start[i % cells];
+    double variance = INFINITY;
+    double e = seen ? merge_rate(merge, merge->sums + i, values, &variance) : 0;
+    radiance->data[i] = (float)(e / responsivity);
+    deviation->data[i] = (float)(sqrt(variance) / responsivity);
+  }
+}

@@ -1,0 +1,49 @@
+/* HDR merge: the frames of one pattern at several exposures to the radiance of every cell.
+ *
+ * With v = (sample - black level) / (full scale - black level) and h = decode(v) the fraction of full scale that light
+ * reached, a sample taken for t seconds estimates the rate e = responsivity * radiance by h / t. Its variance is
+ *   (e t / W + (s_r / W)^2 + (h'(v) q)^2 / 12) / t^2
+ * (photons, reading, quantisation; W full well in electrons, s_r read noise in electrons, q one code value as a step of
+ * v), evaluated at the merged e and not at the sample, so that a dark fluctuation gets no more weight than a bright one
+ * (Granados et al. 2010). */
+#ifndef CLT_RIG_MERGE_H
+#define CLT_RIG_MERGE_H
+
+#include "counterlight/device.h"
+#include "counterlight/image.h"
+#include "rig/footprint.h"
+
+enum { CLT_EXPOSURES_MAX = 8 };
+
+/* What one exposure tells of one cell and channel. */
+typedef struct clt_merge_sum {
+  float light; /* mean of h over the unsaturated samples */
+  float count; /* their number; 0: the exposure is saturated, or the cell is not seen */
+  float raw;   /* mean code value of all samples */
+} clt_merge_sum;
+
+/* Workspace of the merge, allocated once. Zeroed it is valid and empty. */
+typedef struct clt_merge {
+  clt_camera_info camera;
+  const clt_footprints *footprints; /* not owned; outlives the merge */
+  int exposures;
+  double seconds[CLT_EXPOSURES_MAX]; /* what the frames really had */
+  float *light;                      /* h of every code value */
+  float *slope;                      /* dh/dv of every code value */
+  float saturated;                   /* least code value that is left out */
+  float full;                        /* an exposure is left out for a cell whose mean code value reaches this */
+  clt_merge_sum *sums;               /* [(exposure * channels + c) * cells + i] */
+} clt_merge;
+
+clt_status clt_merge_init(clt_merge *merge, const clt_camera_info *camera, const clt_curve *response,
+                          const clt_footprints *footprints, int exposures, clt_error *error);
+void clt_merge_finish(clt_merge *merge);
+
+/* Takes the frame of one exposure in (0 <= exposure < exposures); its size is the camera's. */
+void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame);
+/* Merges what was taken in: mean radiance of every cell over its footprint (negative values are kept) and its standard
+ * deviation; both images have the grid's size. Where no exposure is left the deviation is infinite and the radiance is
+ * the largest that the exposures prove (0 where the cell is not seen). */
+void clt_merge_radiance(const clt_merge *merge, clt_image *radiance, clt_image *deviation);
+
+#endif

@@ -1,0 +1,126 @@
+#include "counterlight/rig.h"
+
+#include <stdlib.h>
+
+#include "base/memory.h"
+#include "counterlight/transport.h"
+#include "rig/internal.h"
+
+static void describe_rig(const clt_rig *base, clt_rig_info *info) {
+  const clt_camera_rig *rig = (const clt_camera_rig *)base;
+  *info = (clt_rig_info){.width = rig->config.width,
+                         .height = rig->config.height,
+                         .channels = rig->sensor.channels,
+                         .response = rig->response,
+                         .source = rig->config.source,
+                         .patterns = rig->patterns,
+                         .frames = rig->frames};
+}
+
+static void close_rig(clt_rig *base) {
+  clt_camera_rig *rig = (clt_camera_rig *)base;
+  if (rig != NULL) {
+    clt_merge_finish(&rig->merge);
+    clt_footprints_finish(&rig->footprints);
+    free(rig->codes);
+    free(rig);
+  }
+}
+
+static const clt_rig_operations camera_rig_operations = {describe_rig, clt_camera_rig_observe, close_rig};
+
+static clt_status check_sizes(const clt_camera_rig *rig, clt_error *error) {
+  const clt_rig_config *config = &rig->config;
+  const clt_projector_info *panel = &rig->panel;
+  const clt_camera_info *sensor = &rig->sensor;
+  if (config->width < 1 || config->height < 1 || config->width > CLT_GRID_SIDE_MAX ||
+      config->height > CLT_GRID_SIDE_MAX) {
+    return clt_fail(error, CLT_BAD_INPUT, "a grid of %d x %d cells; each side is 1 to %d", config->width,
+                    config->height, CLT_GRID_SIDE_MAX);
+  }
+  if (panel->width % config->width != 0 || panel->height % config->height != 0) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "the panel's %d x %d pixels are no whole multiple of the grid's %d x %d cells; choose a grid that "
+                    "divides it",
+                    panel->width, panel->height, config->width, config->height);
+  }
+  if (panel->channels != sensor->channels) {
+    return clt_fail(error, CLT_BAD_INPUT, "the projector has %d channels, the camera %d; they must match",
+                    panel->channels, sensor->channels);
+  }
+  if (sensor->bits < 1 || sensor->bits > 16 || !(sensor->responsivity > 0) || !(sensor->full_well > 0)) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "the camera has %d bits, responsivity %g, full well %g; legal are 1 to 16 bits and values above 0",
+                    sensor->bits, sensor->responsivity, sensor->full_well);
+  }
+  return CLT_OK;
+}
+
+static clt_status check_timing(const clt_camera_rig *rig, clt_error *error) {
+  const clt_rig_config *config = &rig->config;
+  if (config->exposure_count < 1 || config->exposure_count > CLT_EXPOSURES_MAX) {
+    return clt_fail(error, CLT_BAD_INPUT, "%d exposures; legal are 1 to %d", config->exposure_count, CLT_EXPOSURES_MAX);
+  }
+  for (int k = 0; k < config->exposure_count; k++) {
+    double seconds = config->exposures_s[k];
+    if (!(seconds >= rig->sensor.exposure_min_s && seconds <= rig->sensor.exposure_max_s)) {
+      return clt_fail(error, CLT_BAD_INPUT, "an exposure of %g ms; the camera takes %g to %g ms", seconds * 1e3,
+                      rig->sensor.exposure_min_s * 1e3, rig->sensor.exposure_max_s * 1e3);
+    }
+    if (k > 0 && !(seconds > config->exposures_s[k - 1])) {
+      return clt_fail(error, CLT_BAD_INPUT, "exposures of %g and %g ms in this order; they must ascend",
+                      config->exposures_s[k - 1] * 1e3, seconds * 1e3);
+    }
+  }
+  if (!(config->latency_s >= 0) || !(config->timeout_s > 0) || config->attempts < 1) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "latency %g ms, timeout %g ms, %d attempts; the latency is at least 0, the timeout above 0, and "
+                    "there is at least one attempt",
+                    config->latency_s * 1e3, config->timeout_s * 1e3, config->attempts);
+  }
+  return CLT_OK;
+}
+
+static clt_status prepare_rig(clt_camera_rig *rig, clt_error *error) {
+  const clt_rig_config *config = &rig->config;
+  clt_status status = check_sizes(rig, error);
+  if (status == CLT_OK) {
+    status = check_timing(rig, error);
+  }
+  if (status == CLT_OK) {
+    status = clt_footprints_align(config->width, config->height, rig->sensor.width, rig->sensor.height,
+                                  &rig->footprints, error);
+  }
+  if (status == CLT_OK) {
+    status =
+        clt_merge_init(&rig->merge, &rig->sensor, &config->camera, &rig->footprints, config->exposure_count, error);
+  }
+  if (status != CLT_OK) {
+    return status;
+  }
+  clt_curve_format(&config->projector, rig->response, sizeof rig->response);
+  size_t pixels = (size_t)rig->panel.width * (size_t)rig->panel.height;
+  rig->codes = clt_alloc(pixels * (size_t)rig->panel.channels, sizeof *rig->codes);
+  return rig->codes != NULL ? CLT_OK : clt_fail(error, CLT_FAILED, "out of memory for a panel of %zu pixels", pixels);
+}
+
+clt_status clt_rig_open(const clt_rig_config *config, clt_projector *projector, clt_camera *camera, clt_rig **out,
+                        clt_error *error) {
+  clt_camera_rig *rig = clt_alloc(1, sizeof *rig);
+  if (rig == NULL) {
+    return clt_fail(error, CLT_FAILED, "out of memory for a rig");
+  }
+  rig->base.operations = &camera_rig_operations;
+  rig->config = *config;
+  rig->projector = projector;
+  rig->camera = camera;
+  projector->driver->describe(projector, &rig->panel);
+  camera->driver->describe(camera, &rig->sensor);
+  clt_status status = prepare_rig(rig, error);
+  if (status != CLT_OK) {
+    close_rig(&rig->base);
+    return status;
+  }
+  *out = &rig->base;
+  return CLT_OK;
+}
