@@ -31,7 +31,7 @@ clt_status clt_file_begin(const char *path, char *temporary, clt_error *error) {
   char folder[CLT_PATH_MAX];
   clt_file_folder(path, folder);
   const char *slash = strrchr(path, '/');
-  const char *name = slash == NULL ? path : slash + 1;
+  const char *name = path + (slash == NULL ? 0 : slash - path + 1);
   struct timespec now;
   clock_gettime(CLOCK_MONOTONIC, &now);
   int used = snprintf(temporary, CLT_PATH_MAX, "%s/.new-%ld-%lx-%s", folder, (long)getpid(),

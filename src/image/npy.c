@@ -45,7 +45,7 @@ static bool take_word(const char **text, const char *word) {
   return true;
 }
 
-/* A quoted string without escapes. */
+/* A quoted string without escapes; of printable characters only, since messages quote it. */
 static bool take_string(const char **text, char *out, size_t size) {
   skip_blanks(text);
   char quote = **text;
@@ -55,6 +55,11 @@ static bool take_string(const char **text, char *out, size_t size) {
   const char *begin = *text + 1, *end = strchr(begin, quote);
   if (end == NULL || (size_t)(end - begin) >= size) {
     return false;
+  }
+  for (const char *at = begin; at < end; at++) {
+    if (*at < ' ' || *at > '~') {
+      return false;
+    }
   }
   memcpy(out, begin, (size_t)(end - begin));
   out[end - begin] = '\0';

@@ -2,7 +2,9 @@
 import struct
 import subprocess
 import sys
+import tempfile
 import zlib
+from pathlib import Path
 
 import numpy as np
 
@@ -103,14 +105,37 @@ def srgb_encode(light):
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
 
 
-def convert(*arguments):
-    """Runs the program under test, which this script was given: status, lines on stderr."""
-    done = subprocess.run([sys.argv[1], *map(str, arguments)], capture_output=True, timeout=60)
-    assert done.stdout == b'', done.stdout
-    return done.returncode, done.stderr.decode(errors='replace').splitlines()
+class Converter:
+    """The program under test, which the script was given; stderr must stay empty, whatever the files hold."""
+
+    def __init__(self):
+        self.noise = tempfile.TemporaryFile('w+')
+        self.program = subprocess.Popen([sys.argv[1]], text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                        stderr=self.noise)
+
+    def convert(self, source, target, curve='srgb'):
+        """Status and message of reading one picture and writing it as another."""
+        print(source, target, curve, sep='\t', file=self.program.stdin, flush=True)
+        status, _, message = self.program.stdout.readline().partition('\t')
+        self.noise.seek(0)
+        noise = self.noise.read()
+        assert status.isdigit() and message.endswith('\n') and not noise, (source, status, message, noise)
+        return int(status), message[:-1]
+
+    def converted(self, source, target, curve='srgb'):
+        """Converts where that must succeed."""
+        outcome = self.convert(source, target, curve)
+        assert outcome == (0, ''), (source, target, curve, outcome)
+
+    def finish(self):
+        self.program.stdin.close()
+        assert self.program.wait(60) == 0, self.noise.seek(0) or self.noise.read()
 
 
-def converted(*arguments):
-    """Runs it where it must succeed, silently."""
-    outcome = convert(*arguments)
-    assert outcome == (0, []), (arguments, outcome)
+def run(*checks):
+    """Calls each check with a converter and an empty folder."""
+    converter = Converter()
+    for check in checks:
+        with tempfile.TemporaryDirectory() as folder:
+            check(converter, Path(folder))
+    converter.finish()
