@@ -1,0 +1,23 @@
+/* What the values of a transport must be, in memory and in a file. */
+#ifndef CLT_TRANSPORT_CHECK_H
+#define CLT_TRANSPORT_CHECK_H
+
+#include "counterlight/transport.h"
+
+/* A named block of values, as messages speak of it: "room.h5: /dense[0, 3, 4] is NaN". */
+typedef struct clt_values {
+  const char *source; /* the file, or what else holds the values */
+  const char *name;
+  int rank;        /* 1..3 */
+  size_t shape[3]; /* the first rank sizes */
+  const float *data;
+} clt_values;
+
+/* Every value is finite. */
+clt_status clt_check_finite(const clt_values *values, clt_error *error);
+/* Entries of T: finite, and none below -1e-2 of the largest; noise may make an entry slightly negative. */
+clt_status clt_check_entries(const clt_values *values, clt_error *error);
+/* Standard deviations: not negative, not NaN; infinite where a cell was never seen. */
+clt_status clt_check_deviations(const clt_values *values, clt_error *error);
+
+#endif
