@@ -1,0 +1,107 @@
+#include "sim/appearance.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+
+/* out = in transposed, tile by tile; side x side values. */
+static void transpose(const float *in, size_t side, float *out) {
+  enum { TILE = 32 };
+#pragma omp parallel for schedule(static)
+  for (size_t tile = 0; tile < side; tile += TILE) {
+    size_t end = tile + TILE < side ? tile + TILE : side;
+    for (size_t i = 0; i < side; i++) {
+      for (size_t j = tile; j < end; j++) {
+        out[j * side + i] = in[i * side + j];
+      }
+    }
+  }
+}
+
+/* The channel before c whose T is the same, or c. */
+static int twin(const clt_transport *transport, int c, size_t bytes) {
+  for (int k = 0; k < c; k++) {
+    if (memcmp(clt_transport_entries(transport, k), clt_transport_entries(transport, c), bytes) == 0) {
+      return k;
+    }
+  }
+  return c;
+}
+
+clt_status clt_appearance_init(clt_appearance *appearance, const clt_transport *transport, clt_error *error) {
+  clt_transport_info info = clt_transport_describe(transport);
+  size_t cells = info.cols, square = cells * cells;
+  appearance->transport = transport;
+  appearance->cells = cells;
+  appearance->channels = info.channels;
+  appearance->driven = clt_alloc(cells, sizeof *appearance->driven);
+  appearance->drive = clt_alloc(cells, sizeof *appearance->drive);
+  appearance->seen = clt_alloc(cells, sizeof *appearance->seen);
+  bool enough = appearance->driven && appearance->drive && appearance->seen;
+  for (int c = 0; c < info.channels && enough && clt_transport_entries(transport, c) != NULL; c++) {
+    int same = twin(transport, c, square * sizeof(float));
+    appearance->columns[c] = same < c ? appearance->columns[same] : clt_alloc(square, sizeof(float));
+    enough = appearance->columns[c] != NULL;
+    if (enough && same == c) {
+      transpose(clt_transport_entries(transport, c), cells, appearance->columns[c]);
+    }
+  }
+  return enough ? CLT_OK : clt_fail(error, CLT_FAILED, "out of memory for a scene of %zu cells", cells);
+}
+
+void clt_appearance_finish(clt_appearance *appearance) {
+  for (int c = 0; c < appearance->channels; c++) {
+    bool shared = false;
+    for (int k = 0; k < c; k++) {
+      shared = shared || appearance->columns[k] == appearance->columns[c];
+    }
+    if (!shared) {
+      free(appearance->columns[c]);
+    }
+  }
+  free(appearance->driven);
+  free(appearance->drive);
+  free(appearance->seen);
+  *appearance = (clt_appearance){0};
+}
+
+/* seen += T drive over the driven cells. Threads share out the rows, so that each row's sum has one order. */
+static void add_columns(clt_appearance *appearance, const float *columns, size_t driven) {
+  enum { STRIP = 256 };
+  size_t cells = appearance->cells;
+  double *seen = appearance->seen;
+#pragma omp parallel for schedule(static) if (cells > 2 * STRIP)
+  for (size_t strip = 0; strip < cells; strip += STRIP) {
+    size_t end = strip + STRIP < cells ? strip + STRIP : cells;
+    for (size_t k = 0; k < driven; k++) {
+      double drive = appearance->drive[appearance->driven[k]];
+      const float *column = &columns[appearance->driven[k] * cells];
+      for (size_t i = strip; i < end; i++) {
+        seen[i] += drive * (double)column[i];
+      }
+    }
+  }
+}
+
+void clt_appearance_of(clt_appearance *appearance, const float *drive, float *radiance) {
+  size_t cells = appearance->cells;
+  for (int c = 0; c < appearance->channels; c++) {
+    const float *black = clt_transport_black(appearance->transport, c);
+    size_t driven = 0;
+    for (size_t j = 0; j < cells; j++) {
+      appearance->drive[j] = (double)drive[(size_t)c * cells + j];
+      appearance->driven[driven] = j;
+      driven += appearance->drive[j] != 0.0;
+    }
+    memset(appearance->seen, 0, cells * sizeof *appearance->seen);
+    if (appearance->columns[c] != NULL) {
+      add_columns(appearance, appearance->columns[c], driven);
+    } else {
+      clt_transport_apply(appearance->transport, c, appearance->drive, appearance->seen);
+    }
+    for (size_t i = 0; i < cells; i++) {
+      radiance[(size_t)c * cells + i] = (float)((double)black[i] + appearance->seen[i]);
+    }
+  }
+}

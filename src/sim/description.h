@@ -1,0 +1,55 @@
+/* What a scene file says, checked and complete. */
+#ifndef CLT_SIM_DESCRIPTION_H
+#define CLT_SIM_DESCRIPTION_H
+
+#include <stdint.h>
+
+#include "counterlight/image.h"
+#include "counterlight/transport.h"
+#include "sim/geometry.h"
+
+enum { CLT_SURFACES_MAX = 64, CLT_RECTANGLE_CELLS_MAX = 6400, CLT_EXPOSURE_DELAY_MAX = 8, CLT_SIM_CHANNELS_MAX = 3 };
+
+typedef struct clt_projector_description {
+  clt_pinhole pinhole;
+  double intensity[CLT_SIM_CHANNELS_MAX]; /* radiant intensity of a fully driven pixel, W/sr */
+  clt_curve response;                     /* code value to drive */
+  int bits;
+  double black; /* fraction of full drive that leaks at drive 0: light = black + (1 - black) drive */
+  double refresh_s, latency_s;
+} clt_projector_description;
+
+typedef struct clt_camera_description {
+  int cell_pixels; /* a cell is cell_pixels x cell_pixels camera pixels */
+  int bits;
+  clt_curve response;
+  double responsivity;          /* fraction of full well per radiance and second; 0: chosen to suit the scene */
+  double full_well, read_noise; /* electrons */
+  int black_level;              /* code value without light */
+  double frame_s;
+  int exposure_delay; /* frames from a request until it holds */
+} clt_camera_description;
+
+typedef struct clt_scene_description {
+  char path[CLT_PATH_MAX];
+  int width, height, channels;
+  int rays; /* rays traced per cell: rays x rays */
+  clt_projector_description projector;
+  clt_camera_description camera;
+  double ambient[CLT_SIM_CHANNELS_MAX]; /* radiance added to every cell */
+  uint64_t seed;
+  clt_rectangle surfaces[CLT_SURFACES_MAX];
+  int surface_count;
+  clt_transport *transport; /* of a transport_file, owned here; NULL where there are surfaces */
+} clt_scene_description;
+
+/* Reads a scene file. CLT_BAD_INPUT with file, line, key and the legal range. The description was zeroed by the caller,
+ * and is finished by it in either case. */
+clt_status clt_scene_read(const char *path, clt_scene_description *description, clt_error *error);
+void clt_scene_description_finish(clt_scene_description *description);
+
+/* Centre of sub-ray `ray` (0..rays*rays-1) of a cell (row-major, row 0 at the top): its direction from the projector,
+ * and the solid angle it stands for, sr. */
+clt_vector clt_scene_ray(const clt_scene_description *description, int cell, int ray, double *solid_angle);
+
+#endif

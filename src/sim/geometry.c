@@ -1,0 +1,100 @@
+#include "sim/geometry.h"
+
+/* Distances along a ray, and to a plane, below which points count as touching, relative to their lengths. */
+static const double TOUCHING = 1e-9;
+
+bool clt_rectangle_complete(clt_rectangle *rectangle) {
+  clt_vector across = vec_cross(rectangle->u, rectangle->v);
+  double u = vec_length(rectangle->u), v = vec_length(rectangle->v), area = vec_length(across);
+  if (!(u > 1e-6 && v > 1e-6) || fabs(vec_dot(rectangle->u, rectangle->v)) > 1e-6 * u * v) {
+    return false;
+  }
+  rectangle->normal = vec_scale(1.0 / area, across);
+  return true;
+}
+
+clt_vector clt_rectangle_vertex(const clt_rectangle *rectangle, int number) {
+  double s = number == 1 || number == 2, t = number >= 2;
+  return vec_along(rectangle->corner, s, rectangle->u, t, rectangle->v);
+}
+
+double clt_rectangle_area(const clt_rectangle *rectangle) {
+  return vec_length(rectangle->u) * vec_length(rectangle->v);
+}
+
+/* Where the ray meets the rectangle; false where it does not, or only runs along its plane. */
+static bool meet(const clt_rectangle *rectangle, clt_vector origin, clt_vector direction, clt_hit *hit) {
+  double slope = vec_dot(rectangle->normal, direction);
+  if (slope == 0.0) {
+    return false;
+  }
+  hit->distance = vec_dot(rectangle->normal, vec_sub(rectangle->corner, origin)) / slope;
+  clt_vector at = vec_sub(vec_add(origin, vec_scale(hit->distance, direction)), rectangle->corner);
+  hit->s = vec_dot(at, rectangle->u) / vec_dot(rectangle->u, rectangle->u);
+  hit->t = vec_dot(at, rectangle->v) / vec_dot(rectangle->v, rectangle->v);
+  hit->front = slope < 0.0;
+  return hit->distance > TOUCHING && hit->s >= 0.0 && hit->s <= 1.0 && hit->t >= 0.0 && hit->t <= 1.0;
+}
+
+clt_hit clt_first_hit(const clt_rectangle *rectangles, int count, clt_vector origin, clt_vector direction) {
+  clt_hit first = {.surface = -1, .distance = INFINITY};
+  for (int k = 0; k < count; k++) {
+    clt_hit hit = {.surface = k};
+    if (meet(&rectangles[k], origin, direction, &hit) && hit.distance < first.distance) {
+      first = hit;
+    }
+  }
+  return first;
+}
+
+bool clt_segment_blocked(const clt_rectangle *rectangles, const int *which, int count, clt_vector from, clt_vector to) {
+  clt_vector direction = vec_sub(to, from);
+  for (int k = 0; k < count; k++) {
+    clt_hit hit;
+    if (meet(&rectangles[which[k]], from, direction, &hit) && hit.distance < 1.0 - TOUCHING) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* Bit 0: a corner of `of` lies in front of the plane of `plane`; bit 1: one lies behind it. */
+static int sides(const clt_rectangle *plane, const clt_rectangle *of) {
+  double reach = vec_length(of->u) + vec_length(of->v) + vec_length(vec_sub(of->corner, plane->corner));
+  int found = 0;
+  for (int k = 0; k < 4; k++) {
+    double height = vec_dot(plane->normal, vec_sub(clt_rectangle_vertex(of, k), plane->corner));
+    found |= height > TOUCHING * reach ? 1 : height < -TOUCHING * reach ? 2 : 0;
+  }
+  return found;
+}
+
+int clt_possible_blockers(const clt_rectangle *rectangles, int count, int a, int b, int *which) {
+  int found = 0;
+  for (int k = 0; k < count; k++) {
+    if (k != a && k != b && (sides(&rectangles[k], &rectangles[a]) | sides(&rectangles[k], &rectangles[b])) == 3) {
+      which[found++] = k;
+    }
+  }
+  return found;
+}
+
+bool clt_rectangles_face(const clt_rectangle *a, const clt_rectangle *b) {
+  return (sides(a, b) & 1) != 0 && (sides(b, a) & 1) != 0;
+}
+
+bool clt_pinhole_aim(clt_pinhole *pinhole, clt_vector target, clt_vector up) {
+  clt_vector view = vec_sub(target, pinhole->position);
+  clt_vector side = vec_cross(view, up);
+  if (!(vec_length(side) > 1e-6 * vec_length(view) * vec_length(up))) {
+    return false;
+  }
+  pinhole->forward = vec_unit(view);
+  pinhole->right = vec_unit(side);
+  pinhole->up = vec_cross(pinhole->right, pinhole->forward);
+  return true;
+}
+
+clt_vector clt_pinhole_direction(const clt_pinhole *pinhole, double x, double y) {
+  return vec_along(pinhole->forward, x * pinhole->tangent[0], pinhole->right, y * pinhole->tangent[1], pinhole->up);
+}

@@ -1,0 +1,167 @@
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/memory.h"
+#include "sim/light.h"
+#include "sim/state.h"
+
+/* b0 = ambient + what the panel's leak lights. T is for drive above the leak, so that a fully driven panel gives
+ * T 1 + b0; light = black + (1 - black) drive makes the leak black / (1 - black) of T 1. */
+static clt_status complete_black(clt_scene *scene, clt_error *error) {
+  const clt_scene_description *description = &scene->description;
+  size_t cells = (size_t)description->width * (size_t)description->height;
+  double leak = description->projector.black / (1.0 - description->projector.black);
+  double *sums = clt_alloc(cells, sizeof *sums);
+  if (sums == NULL) {
+    return clt_fail(error, CLT_FAILED, "%s: out of memory", description->path);
+  }
+  for (int c = 0; c < description->channels; c++) {
+    float *black = clt_transport_black(scene->transport, c);
+    clt_transport_row_sums(scene->transport, c, sums);
+    for (size_t i = 0; i < cells; i++) {
+      black[i] += (float)(description->ambient[c] + leak * sums[i]);
+      scene->brightest = fmax(scene->brightest, (double)black[i] + sums[i]);
+    }
+  }
+  free(sums);
+  return CLT_OK;
+}
+
+static const char *base_name(const char *path) {
+  const char *slash = strrchr(path, '/');
+  return slash != NULL ? slash + 1 : path;
+}
+
+static void complete_provenance(clt_scene *scene) {
+  clt_provenance *provenance = clt_transport_provenance(scene->transport);
+  *provenance = (clt_provenance){.scheme = "simulated", .error = -1.0};
+  snprintf(provenance->source, sizeof provenance->source, "%s", base_name(scene->description.path));
+  clt_curve_format(&scene->description.projector.response, provenance->response, sizeof provenance->response);
+}
+
+/* The described responsivity, or one at which the brightest cell fills 0.7 of the well within a refresh period. */
+static double choose_responsivity(const clt_scene *scene) {
+  const clt_scene_description *description = &scene->description;
+  if (description->camera.responsivity > 0.0) {
+    return description->camera.responsivity;
+  }
+  return scene->brightest > 0.0 ? 0.7 / (scene->brightest * description->projector.refresh_s) : 1.0;
+}
+
+static clt_status prepare(clt_scene *scene, const char *path, clt_error *error) {
+  clt_status status = clt_scene_read(path, &scene->description, error);
+  if (status != CLT_OK) {
+    return status;
+  }
+  if (scene->description.transport != NULL) {
+    scene->transport = scene->description.transport;
+    scene->description.transport = NULL;
+  } else {
+    status = clt_light_transport(&scene->description, &scene->transport, error);
+  }
+  if (status == CLT_OK) {
+    status = complete_black(scene, error);
+  }
+  if (status == CLT_OK) {
+    complete_provenance(scene);
+    scene->responsivity = choose_responsivity(scene);
+    status = clt_appearance_init(&scene->appearance, scene->transport, error);
+  }
+  if (status == CLT_OK) {
+    status = clt_timeline_init(&scene->timeline, &scene->appearance, error);
+  }
+  return status;
+}
+
+clt_status clt_scene_open(const char *path, clt_scene **out, clt_error *error) {
+  clt_scene *scene = clt_alloc(1, sizeof *scene);
+  if (scene == NULL) {
+    return clt_fail(error, CLT_FAILED, "%s: out of memory", path);
+  }
+  pthread_mutex_init(&scene->lock, NULL);
+  clt_status status = prepare(scene, path, error);
+  if (status != CLT_OK) {
+    clt_scene_close(scene);
+    return status;
+  }
+  *out = scene;
+  return CLT_OK;
+}
+
+void clt_scene_close(clt_scene *scene) {
+  if (scene != NULL) {
+    clt_timeline_finish(&scene->timeline);
+    clt_appearance_finish(&scene->appearance);
+    clt_transport_destroy(scene->transport);
+    clt_scene_description_finish(&scene->description);
+    pthread_mutex_destroy(&scene->lock);
+    free(scene);
+  }
+}
+
+const clt_transport *clt_scene_transport(const clt_scene *scene) {
+  return scene->transport;
+}
+
+/* Exposures 1 : 8 : 64 of whole refresh periods, of which the shortest leaves the brightest cell room below full well,
+ * less than a period only where a whole one would saturate it. */
+static void choose_exposures(const clt_scene *scene, clt_rig_config *config) {
+  const double filled = 0.8, longest_s = 2.0;
+  double refresh_s = scene->description.projector.refresh_s;
+  double fitting_s = filled / (scene->responsivity * fmax(scene->brightest, 1e-30));
+  double shortest_s = fmin(fitting_s, longest_s / 8.0);
+  if (shortest_s >= refresh_s) {
+    shortest_s = floor(shortest_s / refresh_s + 1e-9) * refresh_s;
+  }
+  double longest = fmax(1.0, floor(longest_s / shortest_s + 1e-9));
+  config->exposure_count = 0;
+  for (double factor = 1.0; factor <= 64.0; factor *= 8.0) {
+    double exposure_s = fmax(fmin(factor, longest) * shortest_s, CLT_EXPOSURE_MIN_S);
+    if (config->exposure_count == 0 || exposure_s > config->exposures_s[config->exposure_count - 1]) {
+      config->exposures_s[config->exposure_count++] = exposure_s;
+    }
+  }
+}
+
+void clt_scene_rig_config(const clt_scene *scene, clt_rig_config *config) {
+  const clt_scene_description *description = &scene->description;
+  *config = (clt_rig_config){.width = description->width,
+                             .height = description->height,
+                             .projector = description->projector.response,
+                             .camera = description->camera.response,
+                             .latency_s = description->projector.latency_s + description->projector.refresh_s,
+                             .attempts = 3};
+  choose_exposures(scene, config);
+  double longest_s = fmax(config->exposures_s[config->exposure_count - 1], description->camera.frame_s);
+  config->timeout_s = 1.0 + config->latency_s + longest_s * (description->camera.exposure_delay + 3);
+  snprintf(config->source, sizeof config->source, "scene %.100s", base_name(description->path));
+}
+
+clt_status clt_scene_appearance(const clt_scene *scene, const clt_image *drive, clt_image *radiance, clt_error *error) {
+  const clt_scene_description *description = &scene->description;
+  size_t cells = (size_t)description->width * (size_t)description->height;
+  if (drive->width != description->width || drive->height != description->height ||
+      drive->channels != description->channels) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "the drive is %d x %d with %d channels, but the scene's grid is %d x %d with %d", drive->width,
+                    drive->height, drive->channels, description->width, description->height, description->channels);
+  }
+  double *x = clt_alloc(2 * cells, sizeof *x), *y = x + cells;
+  if (x == NULL) {
+    return clt_fail(error, CLT_FAILED, "out of memory for the scene's appearance");
+  }
+  clt_status status = clt_image_init(radiance, description->channels, description->height, description->width, error);
+  for (int c = 0; c < description->channels && status == CLT_OK; c++) {
+    const float *black = clt_transport_black(scene->transport, c);
+    for (size_t j = 0; j < cells; j++) {
+      x[j] = (double)drive->data[(size_t)c * cells + j];
+    }
+    clt_transport_apply(scene->transport, c, x, y);
+    for (size_t i = 0; i < cells; i++) {
+      radiance->data[(size_t)c * cells + i] = (float)((double)black[i] + y[i]);
+    }
+  }
+  free(x);
+  return status;
+}

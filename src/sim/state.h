@@ -1,0 +1,28 @@
+/* A scene made ready, and the simulated time that its projector and camera share. */
+#ifndef CLT_SIM_STATE_H
+#define CLT_SIM_STATE_H
+
+#include <pthread.h>
+
+#include "counterlight/scene.h"
+#include "sim/description.h"
+#include "sim/timeline.h"
+
+struct clt_scene {
+  clt_scene_description description;
+  clt_transport *transport; /* T and b0 */
+  clt_appearance appearance;
+  double brightest;    /* radiance of the brightest cell under full drive */
+  double responsivity; /* of the camera, described or chosen */
+  /* Below: under lock, for the projector and the camera may be called from two threads. */
+  pthread_mutex_t lock;
+  clt_timeline timeline;
+  int64_t now_ns;
+  bool projector_open, camera_open;
+};
+
+/* Exposure times of the simulated camera, s. */
+#define CLT_EXPOSURE_MIN_S 1e-5
+#define CLT_EXPOSURE_MAX_S 4.0
+
+#endif
