@@ -1,0 +1,80 @@
+/* What a method of inversion is: one file each, collected in the table of solve.c. */
+#ifndef CLT_SOLVE_METHOD_H
+#define CLT_SOLVE_METHOD_H
+
+#include <stdint.h>
+
+#include "counterlight/solve.h"
+#include "solve/system.h"
+
+/* A reciprocity defect up to here lets conjugate gradients converge. */
+#define CLT_RECIPROCAL 0.1
+
+typedef enum clt_outcome {
+  CLT_RUN_CONVERGED,
+  CLT_RUN_STOPPED, /* by the iteration limit, the deadline or the precision of double; light holds the best */
+  CLT_RUN_BROKE    /* the method does not fit this system (note says why); light holds the best so far */
+} clt_outcome;
+
+enum { CLT_CURVE_MAX = 256, CLT_NOTE_MAX = 128 };
+
+/* One channel's way through a method: its limits, and what is told of it. */
+typedef struct clt_run {
+  double tolerance;
+  int iteration_limit; /* counts down from the start of the channel, over every method that runs on it */
+  int64_t start_ns;
+  double deadline_s;           /* since start_ns; <= 0: none */
+  double radius_high;          /* the certificate's bound of rho(R) */
+  int iterations;              /* done so far */
+  size_t curve_count;          /* of the method that runs now */
+  double curve[CLT_CURVE_MAX]; /* ||b - S l|| after each iteration */
+  char note[CLT_NOTE_MAX];     /* why the method broke */
+} clt_run;
+
+typedef struct clt_method {
+  const char *name, *summary;
+  bool bounded; /* keeps 0 <= x <= 1, and takes systems with rows != cols */
+  size_t vectors;
+  /* NULL, or fails with CLT_BAD_INPUT where the certificate of a channel shows that the method cannot serve. */
+  clt_status (*check)(const clt_channel_certificate *channel, clt_error *error);
+  /* Improves system->light until ||b - S l|| <= run->tolerance ||b||; needs `vectors` reserved, b != 0. */
+  clt_outcome (*run)(clt_system *system, clt_run *run);
+} clt_method;
+
+extern const clt_method clt_method_jacobi, clt_method_pcg, clt_method_gmres, clt_method_bounded;
+
+/* The Krylov method that the reciprocity defect allows: pcg or gmres. */
+const clt_method *clt_method_linear(double reciprocity);
+
+/* The residual before the first iteration opens the curve. */
+void clt_run_open(clt_run *run, double norm);
+/* Counts an iteration that ended with this residual. */
+void clt_run_count(clt_run *run, double norm);
+/* False where the limit or the deadline has come. */
+bool clt_run_may_go_on(const clt_run *run);
+void clt_run_note(clt_run *run, const char *format, ...) CLT_PRINTF(2, 3);
+
+/* GMRES for any operator on n values (Saad & Schultz 1986). */
+enum { CLT_GMRES_STEPS = 24, CLT_GMRES_VECTORS = CLT_GMRES_STEPS + 1 };
+typedef struct clt_gmres {
+  void (*apply)(void *context, const double *in, double *out);
+  void *context;
+  size_t count;
+  double *basis; /* CLT_GMRES_VECTORS vectors, stride apart */
+  size_t stride;
+  double target; /* residual norm to stop at */
+} clt_gmres;
+/* One cycle: adds to x the d of the Krylov space of r that makes ||r - A d|| least. r of norm `norm` stays. */
+void clt_gmres_cycle(const clt_gmres *gmres, clt_run *run, const double *r, double norm, double *x);
+
+/* Fills w (cols values, 0 at dark cells, mean 1 over lit ones) so that S diag(w) is nearest to symmetric, and returns
+ * the reciprocity defect that is left. Needs CLT_FLUX_VECTORS reserved. */
+enum { CLT_FLUX_VECTORS = CLT_GMRES_VECTORS + 4 };
+double clt_flux_weights(clt_system *system, double *w);
+
+/* The worst figures of any channel: the method must serve all of them. */
+clt_channel_certificate clt_certificate_worst(const clt_certificate *certificate);
+/* True where the certificate was made for a transport of this shape. */
+bool clt_certificate_fits(const clt_certificate *certificate, const clt_transport *transport);
+
+#endif

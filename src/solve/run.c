@@ -1,0 +1,33 @@
+#include <stdarg.h>
+#include <stdio.h>
+
+#include "base/clock.h"
+#include "solve/method.h"
+
+static void append(clt_run *run, double norm) {
+  if (run->curve_count < CLT_CURVE_MAX) {
+    run->curve[run->curve_count++] = norm;
+  }
+}
+
+void clt_run_open(clt_run *run, double norm) {
+  run->curve_count = 0;
+  append(run, norm);
+}
+
+void clt_run_count(clt_run *run, double norm) {
+  run->iterations++;
+  append(run, norm);
+}
+
+bool clt_run_may_go_on(const clt_run *run) {
+  return run->iterations < run->iteration_limit &&
+         (run->deadline_s <= 0 || clt_clock_since(run->start_ns) < run->deadline_s);
+}
+
+void clt_run_note(clt_run *run, const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  vsnprintf(run->note, sizeof run->note, format, arguments);
+  va_end(arguments);
+}

@@ -1,0 +1,112 @@
+#include "solve/system.h"
+
+#include <stdlib.h>
+
+#include "base/memory.h"
+
+clt_status clt_system_init(clt_system *system, const clt_transport *transport, clt_error *error) {
+  clt_transport_info info = clt_transport_describe(transport);
+  *system = (clt_system){.transport = transport, .rows = info.rows, .cols = info.cols};
+  system->square = info.rows == info.cols;
+  system->stride = info.rows > info.cols ? info.rows : info.cols;
+  system->scale = clt_alloc(info.cols, sizeof(double));
+  system->drive = clt_alloc(info.cols, sizeof(double));
+  system->light = clt_alloc(info.cols, sizeof(double));
+  system->seen = clt_alloc(info.rows, sizeof(double));
+  system->wanted = clt_alloc(info.rows, sizeof(double));
+  if (system->scale == NULL || system->drive == NULL || system->light == NULL || system->seen == NULL ||
+      system->wanted == NULL) {
+    clt_system_finish(system);
+    return clt_fail(error, CLT_FAILED, "not enough memory to solve for %zu cells", info.cols);
+  }
+  return CLT_OK;
+}
+
+void clt_system_finish(clt_system *system) {
+  free(system->scale);
+  free(system->drive);
+  free(system->light);
+  free(system->seen);
+  free(system->wanted);
+  free(system->pool);
+  *system = (clt_system){0};
+}
+
+void clt_system_select(clt_system *system, int channel, const double *first_bounce, const unsigned char *lit) {
+  system->channel = channel;
+  system->first_bounce = first_bounce;
+  system->lit = lit;
+  system->flux = NULL;
+  system->reciprocity = 0;
+  system->wanted_norm = 0;
+  for (size_t j = 0; j < system->cols; j++) {
+    system->scale[j] = lit[j] ? 1 / first_bounce[j] : 0;
+  }
+  memset(system->light, 0, system->cols * sizeof(double));
+  memset(system->wanted, 0, system->rows * sizeof(double));
+}
+
+bool clt_system_row_is_lit(const clt_system *system, size_t row) {
+  return !system->square || system->lit[row];
+}
+
+void clt_system_want(clt_system *system, const double *wanted) {
+  for (size_t i = 0; i < system->rows; i++) {
+    system->wanted[i] = clt_system_row_is_lit(system, i) ? wanted[i] : 0;
+  }
+  system->wanted_norm = clt_norm(system->rows, system->wanted);
+}
+
+clt_status clt_system_reserve(clt_system *system, size_t vectors, clt_error *error) {
+  if (vectors <= system->pool_vectors) {
+    return CLT_OK;
+  }
+  free(system->pool);
+  system->pool_vectors = 0;
+  system->pool = clt_alloc(vectors, system->stride * sizeof(double));
+  if (system->pool == NULL) {
+    return clt_fail(error, CLT_FAILED, "not enough memory for %zu vectors of %zu cells", vectors, system->stride);
+  }
+  system->pool_vectors = vectors;
+  return CLT_OK;
+}
+
+double *clt_system_vector(const clt_system *system, size_t index) {
+  return system->pool + index * system->stride;
+}
+
+static void drop_dark_rows(const clt_system *system, double *values) {
+  if (!system->square) {
+    return;
+  }
+  for (size_t i = 0; i < system->rows; i++) {
+    values[i] = system->lit[i] ? values[i] : 0;
+  }
+}
+
+void clt_system_apply(clt_system *system, const double *l, double *out) {
+  for (size_t j = 0; j < system->cols; j++) {
+    system->drive[j] = l[j] * system->scale[j];
+  }
+  clt_transport_apply(system->transport, system->channel, system->drive, out);
+  drop_dark_rows(system, out);
+  system->products++;
+}
+
+void clt_system_apply_transposed(clt_system *system, const double *r, double *out) {
+  clt_copy(system->rows, r, system->seen);
+  drop_dark_rows(system, system->seen);
+  clt_transport_apply_transposed(system->transport, system->channel, system->seen, out);
+  for (size_t j = 0; j < system->cols; j++) {
+    out[j] *= system->scale[j];
+  }
+  system->products++;
+}
+
+double clt_system_residual(clt_system *system, const double *l, double *r) {
+  clt_system_apply(system, l, r);
+  for (size_t i = 0; i < system->rows; i++) {
+    r[i] = system->wanted[i] - r[i];
+  }
+  return clt_norm(system->rows, r);
+}

@@ -1,0 +1,72 @@
+/* The linear system S l = b of one colour channel over its lit cells.
+ *
+ * S = T F^-1 restricted to lit rows and lit columns; l = F x. Vectors keep their full length (rows or cols values) and
+ * hold 0 at dark cells. Where rows = cols a row is lit with its cell; otherwise every row takes part. */
+#ifndef CLT_SOLVE_SYSTEM_H
+#define CLT_SOLVE_SYSTEM_H
+
+#include <cblas.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "counterlight/status.h"
+#include "counterlight/transport.h"
+
+typedef struct clt_system {
+  const clt_transport *transport;
+  size_t rows, cols;
+  bool square;
+
+  /* the channel that is selected */
+  int channel;
+  const double *first_bounce; /* F, cols values */
+  const double *flux;         /* w, cols values; NULL while the certificate is being made */
+  const unsigned char *lit;   /* cols values */
+  double reciprocity;
+
+  double *scale;        /* 1 / F at lit cells, 0 at dark ones; cols values */
+  double *drive, *seen; /* operands of the products with T; cols and rows values */
+  double *wanted;       /* b; rows values, 0 at dark rows */
+  double *light;        /* l, the unknown: the start before a method runs, its best answer after; cols values */
+  double wanted_norm;   /* ||b|| */
+  long products;        /* with T or T' */
+
+  double *pool; /* a method's vectors of max(rows, cols) values; they hold nothing between two runs */
+  size_t stride, pool_vectors;
+} clt_system;
+
+/* Workspace for any channel of the transport, which must outlive the system. */
+clt_status clt_system_init(clt_system *system, const clt_transport *transport, clt_error *error);
+void clt_system_finish(clt_system *system); /* accepts a zeroed system */
+/* Turns to a channel; the arrays (cols values) must stay. light and wanted become 0. */
+void clt_system_select(clt_system *system, int channel, const double *first_bounce, const unsigned char *lit);
+/* Takes b from rows values, dropping dark rows. */
+void clt_system_want(clt_system *system, const double *wanted);
+bool clt_system_row_is_lit(const clt_system *system, size_t row);
+/* Makes room for a method's vectors. */
+clt_status clt_system_reserve(clt_system *system, size_t vectors, clt_error *error);
+double *clt_system_vector(const clt_system *system, size_t index);
+
+/* out = S l: cols values to rows values. */
+void clt_system_apply(clt_system *system, const double *l, double *out);
+/* out = S' r: rows values to cols values. */
+void clt_system_apply_transposed(clt_system *system, const double *r, double *out);
+/* r = b - S l; returns ||r||. */
+double clt_system_residual(clt_system *system, const double *l, double *r);
+
+static inline double clt_dot(size_t count, const double *a, const double *b) {
+  return cblas_ddot((blasint)count, a, 1, b, 1);
+}
+static inline double clt_norm(size_t count, const double *a) {
+  return cblas_dnrm2((blasint)count, a, 1);
+}
+/* y += factor x */
+static inline void clt_add(size_t count, double factor, const double *x, double *y) {
+  cblas_daxpy((blasint)count, factor, x, 1, y, 1);
+}
+static inline void clt_copy(size_t count, const double *from, double *to) {
+  memcpy(to, from, count * sizeof *to);
+}
+
+#endif
