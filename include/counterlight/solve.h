@@ -28,8 +28,11 @@ typedef struct clt_channel_certificate {
   double white;       /* median over lit cells of F: the radiance that white means by default */
 } clt_channel_certificate;
 
-/* Bounds by at most 8 power steps from x = 1 with R clipped at 0 (NUMERICS section 1), flux weights w such that
- * S diag(w) is nearest to symmetric, dark cells from F and the transport's sigma. */
+/* Bounds by at most 8 power steps from x = 1 (radius_high with the negative entries of a dense R clipped to 0,
+ * radius_low with R as it stands, whose noise averages out), flux weights w such that S diag(w) is nearest to
+ * symmetric, dark cells from F (below 1e-3 of the 90th percentile) and the transport's sigma (below 5 of them). Where
+ * rows != cols there is no diagonal: a column's sum stands for F, and radius_high, norm_high and reciprocity are
+ * infinite (not known). */
 CLT_PUBLIC clt_status clt_certify(const clt_transport *transport, clt_certificate **out, clt_error *error);
 CLT_PUBLIC void clt_certificate_destroy(clt_certificate *certificate);
 CLT_PUBLIC const clt_channel_certificate *clt_certificate_channel(const clt_certificate *certificate, int channel);
@@ -42,7 +45,8 @@ CLT_PUBLIC const double *clt_certificate_flux(const clt_certificate *certificate
 typedef struct clt_solve_options {
   const char *method;  /* a name from clt_method_name, or "auto" (NULL means "auto") */
   double tolerance;    /* relative residual ||T x - b|| / ||b|| over lit rows to stop at, > 0; 0 means 1e-4. "bounded":
-                          the projected gradient's norm relative to its start */
+                          ||l - P(l - g)|| relative to its value at x = 0, with l = F x, g the gradient in l and P the
+                          projection on 0 <= l <= F */
   int iteration_limit; /* > 0; 0 means 1000 */
   double deadline_s;   /* wall time after which the best drive so far is returned; <= 0 means none */
   const double *start; /* warm start: channels * cols drive values, or NULL for zero */
@@ -109,7 +113,8 @@ CLT_PUBLIC clt_status clt_target(const clt_transport *transport, const clt_certi
 CLT_PUBLIC clt_status clt_predict(const clt_transport *transport, const clt_image *drive, clt_image *seen,
                                   clt_error *error);
 
-/* ||gain * seen - target|| / ||target|| over lit cells; with best_gain the gain that makes it least, else gain 1. */
+/* ||gain * seen - target|| / ||target|| over lit cells; with best_gain the gain that makes it least, else gain 1. For a
+ * target that is black everywhere the distance is taken relative to white in place of the target. */
 CLT_PUBLIC double clt_appearance_error(const clt_certificate *certificate, const clt_image *seen,
                                        const clt_image *target, bool best_gain);
 

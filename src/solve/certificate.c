@@ -6,6 +6,7 @@
 
 /* A cell is dark below this many standard deviations of its row, or below this share of the bright cells' F. */
 static const double DARK_SIGMAS = 5, DARK_SHARE = 1e-3, BRIGHT_QUANTILE = 0.9;
+static const double SHIFT = 0.05; /* of the power iteration, relative to the radius */
 enum { POWER_STEPS = 6 };
 
 struct clt_certificate {
@@ -64,17 +65,17 @@ static size_t find_lit(const clt_system *system, int channel, const double *firs
   return count;
 }
 
-/* y = max(R, 0) x for x >= 0. A dense T is clipped entry by entry; other storage gives only the product with the
- * unclipped R, clipped as a whole: where noise left negative entries the bounds then come out lower by their share. */
+/* y = max(R x, 0): what products with T give of any storage. Noise averages out over a row. */
+static void apply_averaged(clt_system *system, const double *x, double *y) {
+  clt_system_apply(system, x, y);
+  for (size_t i = 0; i < system->cols; i++) {
+    y[i] = fmax(y[i] - x[i], 0);
+  }
+}
+
+/* y = max(R, 0) x for x >= 0, entry by entry of a dense T. */
 static void apply_clipped(clt_system *system, const double *x, double *y) {
   const float *entries = clt_transport_entries(system->transport, system->channel);
-  if (entries == NULL) {
-    clt_system_apply(system, x, y);
-    for (size_t i = 0; i < system->cols; i++) {
-      y[i] = fmax(y[i] - x[i], 0);
-    }
-    return;
-  }
   for (size_t j = 0; j < system->cols; j++) {
     system->drive[j] = x[j] * system->scale[j];
   }
@@ -112,25 +113,26 @@ static void ratios(const clt_system *system, const double *x, const double *y, d
  * tightens both; the small shift s keeps x positive. The lower bound holds for any support of x too, since rho(R) is at
  * least that of a principal submatrix; the last two products use the brightest part of x, because one cell that
  * receives no light would make the bound 0. */
-static void bound_radius(clt_system *system, clt_channel_certificate *channel) {
+static void bound_radius(clt_system *system, void (*apply)(clt_system *, const double *, double *), double *radius_low,
+                         double *radius_high) {
   static const double PARTS[] = {0.1, 0.5};
   double *x = clt_system_vector(system, 0), *y = clt_system_vector(system, 1), low, high, top = 1;
-  channel->radius_low = 0;
-  channel->radius_high = INFINITY;
+  *radius_low = 0;
+  *radius_high = INFINITY;
   for (size_t i = 0; i < system->cols; i++) {
     x[i] = system->lit[i] ? 1 : 0;
   }
   for (int step = 0; step < POWER_STEPS; step++) {
-    apply_clipped(system, x, y);
+    apply(system, x, y);
     ratios(system, x, y, &low, &high);
-    channel->radius_low = fmax(channel->radius_low, low);
-    channel->radius_high = fmin(channel->radius_high, high);
+    *radius_low = fmax(*radius_low, low);
+    *radius_high = fmin(*radius_high, high);
     if (high == 0) {
       return;
     }
     top = 0;
     for (size_t i = 0; i < system->cols; i++) {
-      x[i] = y[i] / high + 0.05 * x[i];
+      x[i] = y[i] / high + SHIFT * x[i];
       top = fmax(top, x[i]);
     }
   }
@@ -138,9 +140,21 @@ static void bound_radius(clt_system *system, clt_channel_certificate *channel) {
     for (size_t i = 0; i < system->cols; i++) {
       x[i] = x[i] >= PARTS[part] * top ? x[i] : 0;
     }
-    apply_clipped(system, x, y);
+    apply(system, x, y);
     ratios(system, x, y, &low, &high);
-    channel->radius_low = fmax(channel->radius_low, low);
+    *radius_low = fmax(*radius_low, low);
+  }
+}
+
+/* Where R has negative entries (noise) a dense T is bounded from above with them clipped to 0, and from below with them
+ * kept: clipping only one sign of the noise adds up over a row and would refuse Jacobi where it converges. Other
+ * storage has only the products, and with them both bounds of R as it stands. */
+static void certify_radius(clt_system *system, clt_channel_certificate *channel) {
+  bound_radius(system, apply_averaged, &channel->radius_low, &channel->radius_high);
+  if (clt_transport_entries(system->transport, system->channel) != NULL) {
+    double low;
+    bound_radius(system, apply_clipped, &low, &channel->radius_high);
+    channel->radius_low = fmin(channel->radius_low, channel->radius_high);
   }
 }
 
@@ -193,7 +207,7 @@ static void certify_channel(clt_certificate *certificate, clt_system *system, in
     return;
   }
   clt_system_select(system, c, first_bounce, lit);
-  bound_radius(system, channel);
+  certify_radius(system, channel);
   channel->norm_high = bound_norm(system);
   channel->reciprocity = clt_flux_weights(system, flux);
 }

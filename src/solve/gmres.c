@@ -2,7 +2,7 @@
 
 #include "solve/method.h"
 
-static const double STALE_FACTOR = 0.98; /* a cycle that leaves more than this of the residual gains nothing */
+static const double STALE_FACTOR = 0.9; /* a cycle that leaves more than this of the residual gains nothing */
 enum { STALE_CYCLES = 2 };
 
 /* The least-squares problem min ||norm e_1 - H y|| of a cycle, H reduced to triangular by Givens rotations. */

@@ -12,6 +12,7 @@
  * with <a, b> = a' W^-1 b: plain conjugate gradients on S in the inner product in which S is self-adjoint. The
  * recurrence keeps r = b - S l for any S, so what tells a wrong S is a curvature <p, S p> <= 0 or a residual that stops
  * falling; what tells rounding is a recomputed r that differs. */
+static const double ROUNDING = 1e-13; /* a residual this small, relative to b, is all that double gives */
 enum { RECOMPUTE_EVERY = 10, STALE_STEPS = 20, RESTARTS_MAX = 3 };
 
 typedef struct cg {
@@ -23,7 +24,6 @@ typedef struct cg {
 
 static double weighted_dot(size_t count, const double *weight, const double *a, const double *b) {
   double sum = 0;
-#pragma omp simd reduction(+ : sum)
   for (size_t i = 0; i < count; i++) {
     sum += weight[i] * a[i] * b[i];
   }
@@ -131,10 +131,12 @@ static clt_outcome run_pcg(clt_system *system, clt_run *run) {
       break;
     }
   }
-  if (outcome != CLT_RUN_CONVERGED) {
-    clt_copy(system->cols, state.best, system->light);
+  if (outcome == CLT_RUN_CONVERGED) {
+    return outcome;
   }
-  return outcome;
+  clt_copy(system->cols, state.best, system->light);
+  bool rounding = clt_system_residual(system, system->light, state.q) <= ROUNDING * system->wanted_norm;
+  return rounding ? CLT_RUN_STOPPED : outcome;
 }
 
 const clt_method clt_method_pcg = {

@@ -23,7 +23,8 @@ typedef struct test_room {
   size_t cells;
   clt_transport *transport;
   clt_certificate *certificate;
-  double *flux; /* S_ii m_i / a_i before scaling: the weights that symmetrise S */
+  double *flux;          /* S_ii m_i / a_i before scaling: the weights that symmetrise S */
+  double *known, *b, *x; /* a drive, b = T known, and room for an answer, once room_ask has been called */
 } test_room;
 
 static inline double *room_numbers(size_t count) {
@@ -161,6 +162,9 @@ static inline void room_free(test_room *room) {
   clt_certificate_destroy(room->certificate);
   clt_transport_destroy(room->transport);
   free(room->flux);
+  free(room->known);
+  free(room->b);
+  free(room->x);
 }
 
 /* A dense transport of given float32 entries; one channel, cells x 1. */
@@ -228,6 +232,15 @@ static inline void room_wanted(const test_room *room, uint64_t seed, double low,
     }
     room_product(room->transport, c, channel, b + (size_t)c * info.rows);
   }
+}
+
+/* Makes the room's own problem of it. */
+static inline void room_ask(test_room *room, uint64_t seed, double low, double high) {
+  clt_transport_info info = clt_transport_describe(room->transport);
+  room->known = room_numbers((size_t)info.channels * info.cols);
+  room->x = room_numbers((size_t)info.channels * info.cols);
+  room->b = room_numbers((size_t)info.channels * info.rows);
+  room_wanted(room, seed, low, high, room->known, room->b);
 }
 
 static inline double room_distance(const double *a, const double *b, size_t count) {

@@ -129,26 +129,22 @@ static void random_problems_reach_the_optimum(void **state) {
                                                         .albedo = {albedo},
                                                         .spread = .6,
                                                         .openness = .3 * test_random(&random)});
-    double *known = room_numbers(room.cells), *b = room_numbers(room.cells), *x = room_numbers(room.cells);
-    room_wanted(&room, seed, low, high, known, b);
-    problem p = problem_of(&room, b);
-    clt_solve_result result = solve(&room, "bounded", 1e-6, b, x);
+    room_ask(&room, seed, low, high);
+    problem p = problem_of(&room, room.b);
+    clt_solve_result result = solve(&room, "bounded", 1e-6, room.b, room.x);
     iterations += result.iterations;
     assert_true(result.converged);
-    assert_in_box(x, room.cells);
-    double reached = objective(&p, x), kkt = optimality(&p, x);
+    assert_in_box(room.x, room.cells);
+    double reached = objective(&p, room.x), kkt = optimality(&p, room.x);
     if (!(kkt <= 1e-6 * (1 + 1e-6))) {
       fail_msg("seed %d: optimality %.3g after %d iterations", (int)seed, kkt, result.iterations);
     }
-    assert_true(reached <= clamped_objective(&p, b, x) * (1 + 1e-9));
+    assert_true(reached <= clamped_objective(&p, room.b, room.x) * (1 + 1e-9));
     if (seed % 5 == 0) {
-      assert_near(reached / reference_optimum(&p, x), 1, 1e-6);
+      assert_near(reached / reference_optimum(&p, room.x), 1, 1e-6);
       compared++;
     }
     problem_free(&p);
-    free(known);
-    free(b);
-    free(x);
     room_free(&room);
   }
   print_message("200 problems, %.1f iterations on average, %d compared with coordinate descent\n", iterations / 200.0,
@@ -192,19 +188,15 @@ static void clamping_is_far_worse_on_a_checkerboard(void **state) {
 static void a_reachable_target_has_the_unbounded_solution(void **state) {
   (void)state;
   test_room room = room_cube(5, .8, .5, 4);
-  double *known = room_numbers(room.cells), *b = room_numbers(room.cells), *x = room_numbers(room.cells),
-         *y = room_numbers(room.cells);
-  room_wanted(&room, 3, .02, .98, known, b);
-  clt_solve_result automatic = solve(&room, "auto", 1e-8, b, x);
+  double *y = room_numbers(room.cells);
+  room_ask(&room, 3, .02, .98);
+  clt_solve_result automatic = solve(&room, "auto", 1e-8, room.b, room.x);
   assert_string_equal(automatic.method, "pcg");
-  clt_solve_result bounded = solve(&room, "bounded", 1e-8, b, y);
+  clt_solve_result bounded = solve(&room, "bounded", 1e-8, room.b, y);
   assert_true(automatic.converged && bounded.converged);
-  assert_true(room_distance(x, known, room.cells) < 1e-6);
-  assert_true(room_distance(y, known, room.cells) < 1e-6);
-  assert_near(bounded.residual, room_residual(&room, y, b), 1e-14);
-  free(known);
-  free(b);
-  free(x);
+  assert_true(room_distance(room.x, room.known, room.cells) < 1e-6);
+  assert_true(room_distance(y, room.known, room.cells) < 1e-6);
+  assert_near(bounded.residual, room_residual(&room, y, room.b), 1e-14);
   free(y);
   room_free(&room);
 }
@@ -232,24 +224,20 @@ static void a_negative_target_gives_exactly_black(void **state) {
 static void a_warm_start_reaches_the_same_optimum(void **state) {
   (void)state;
   test_room room = room_cube(6, .9, .3, 4);
-  double *known = room_numbers(room.cells), *b = room_numbers(room.cells), *x = room_numbers(room.cells),
-         *y = room_numbers(room.cells);
-  room_wanted(&room, 3, -.4, 1.4, known, b);
-  clt_solve_result cold = solve(&room, "bounded", 1e-7, b, x), warm;
-  memcpy(y, x, room.cells * sizeof *y);
+  double *y = room_numbers(room.cells);
+  room_ask(&room, 3, -.4, 1.4);
+  clt_solve_result cold = solve(&room, "bounded", 1e-7, room.b, room.x), warm;
+  memcpy(y, room.x, room.cells * sizeof *y);
   for (size_t i = 0; i < room.cells; i++) {
-    b[i] *= 1 + .03 * sin((double)i);
+    room.b[i] *= 1 + .03 * sin((double)i);
   }
   clt_error error = {0};
   clt_solve_options options = {.method = "bounded", .tolerance = 1e-7, .start = y};
-  assert_ok(clt_solve(room.transport, room.certificate, b, &options, y, &warm, &error), error);
-  cold = solve(&room, "bounded", 1e-7, b, x);
+  assert_ok(clt_solve(room.transport, room.certificate, room.b, &options, y, &warm, &error), error);
+  cold = solve(&room, "bounded", 1e-7, room.b, room.x);
   assert_true(warm.converged && cold.converged);
-  assert_true(room_distance(y, x, room.cells) < 1e-4);
+  assert_true(room_distance(y, room.x, room.cells) < 1e-4);
   assert_near(warm.residual, cold.residual, 1e-9);
-  free(known);
-  free(b);
-  free(x);
   free(y);
   room_free(&room);
 }
@@ -311,21 +299,17 @@ static void shadows_take_no_part_in_the_bounded_solve(void **state) {
     entries[i] = i % n % 6 == 0 ? 0 : entries[i];
   }
   room_certify(&room);
-  double *known = room_numbers(n), *b = room_numbers(n), *x = room_numbers(n);
-  room_wanted(&room, 3, -.2, 1.2, known, b);
+  room_ask(&room, 3, -.2, 1.2);
   for (size_t i = 0; i < n; i += 6) {
-    b[i] = 5;
+    room.b[i] = 5;
   }
-  problem p = problem_of(&room, b);
-  clt_solve_result result = solve(&room, "bounded", 1e-6, b, x);
-  assert_true(result.converged && optimality(&p, x) <= 1e-6 * (1 + 1e-6));
+  problem p = problem_of(&room, room.b);
+  clt_solve_result result = solve(&room, "bounded", 1e-6, room.b, room.x);
+  assert_true(result.converged && optimality(&p, room.x) <= 1e-6 * (1 + 1e-6));
   for (size_t j = 0; j < n; j += 6) {
-    assert_true(x[j] == 0);
+    assert_true(room.x[j] == 0);
   }
   problem_free(&p);
-  free(known);
-  free(b);
-  free(x);
   room_free(&room);
 }
 

@@ -22,9 +22,9 @@ static double *lit_matrix(const test_room *room, bool clipped, size_t *n) {
   return r;
 }
 
-static double spectral_radius(const test_room *room) {
+static double spectral_radius(const test_room *room, bool clipped) {
   size_t n;
-  double *r = lit_matrix(room, true, &n), *real = room_numbers(n), *imaginary = room_numbers(n), radius = 0;
+  double *r = lit_matrix(room, clipped, &n), *real = room_numbers(n), *imaginary = room_numbers(n), radius = 0;
   assert_int_equal(
       LAPACKE_dgeev(LAPACK_ROW_MAJOR, 'N', 'N', (lapack_int)n, r, (lapack_int)n, real, imaginary, NULL, 1, NULL, 1), 0);
   for (size_t i = 0; i < n; i++) {
@@ -52,7 +52,7 @@ static double spectral_norm(const test_room *room) {
 /* `slack` is how far apart the bounds may lie, relative to rho(R). */
 static void assert_bounds_hold(const test_room *room, double slack) {
   const clt_channel_certificate *channel = clt_certificate_channel(room->certificate, 0);
-  double radius = spectral_radius(room), norm = spectral_norm(room);
+  double radius = spectral_radius(room, true), norm = spectral_norm(room);
   assert_true(channel->radius_low <= radius * (1 + 1e-9) + 1e-12);
   assert_true(channel->radius_high >= radius * (1 - 1e-9) - 1e-12);
   assert_true(channel->radius_high - channel->radius_low <= slack * radius + 1e-12);
@@ -91,6 +91,27 @@ static void bounds_hold_for_matrices_of_any_shape(void **state) {
     test_room room = room_of(N, N, entries);
     assert_bounds_hold(&room, 1);
     assert_true(clt_certificate_channel(room.certificate, 0)->radius_low > 0);
+    room_free(&room);
+  }
+}
+
+/* Case 14: noise of both signs on every entry leaves rho(R) near what it was, and the bounds around it. */
+static void noise_does_not_push_the_bounds_away(void **state) {
+  (void)state;
+  for (uint64_t seed = 1; seed <= 4; seed++) {
+    test_room room = room_cube(6, .4, .2, seed);
+    float *entries = clt_transport_entries(room.transport, 0);
+    double clean = spectral_radius(&room, true);
+    uint64_t random = seed;
+    for (size_t i = 0; i < room.cells * room.cells; i++) {
+      entries[i] += (float)(.01 * (test_random(&random) - .5));
+    }
+    room_certify(&room);
+    const clt_channel_certificate *channel = clt_certificate_channel(room.certificate, 0);
+    double radius = spectral_radius(&room, false);
+    assert_near(radius, clean, .1 * clean);
+    assert_true(channel->radius_low <= radius && radius <= channel->radius_high);
+    assert_true(channel->radius_low > .8 * radius);
     room_free(&room);
   }
 }
@@ -271,6 +292,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(bounds_hold_the_true_radius_and_norm),
       cmocka_unit_test(bounds_hold_for_matrices_of_any_shape),
+      cmocka_unit_test(noise_does_not_push_the_bounds_away),
       cmocka_unit_test(disconnected_rooms_are_bounded_by_the_brighter),
       cmocka_unit_test(jacobi_is_certified_below_one_half),
       cmocka_unit_test(flux_weights_are_recovered),
