@@ -100,12 +100,12 @@ def check_npy_headers(converter, folder):
     four = b'\0\0\0\0'
     (folder / 'in.npy').write_bytes(npy(good, four))
     converter.converted(folder / 'in.npy', folder / 'fine.npy')  # so it is what is changed below that is refused
-    for old, new in (('(1, 1)', '(1, 1, 1, 1)'), ('(1, 1)', '(-1, -1)'), ('(1, 1)', '(1 1)'), ('(1, 1)', '[1, 1]'),
-                     ('(1, 1)', '(1.0, 1)'), ('(1, 1)', '(4294967296, 4294967296)'), ('(1, 1)', '(1, 99999999999999999999)'),
-                     ('(1, 1)', '(32769, 1)'), ('(1, 1)', '(32768, 32768, 32768)'), ("'shape'", "'form'"), ('False', 'Maybe'),
-                     ('False', 'True'), ("'<f4'", '<f4'), ("'<f4'", "'<f4"), ("'<f4'", "'|f4'"), ('}', ''), ('{', ''),
-                     (', }', ', } x'), (', }', ", 'shape': (1, 1)}"), (', }', ", 'more': 1}"), ('(1, 1)', '(,1)'),
-                     ('<f4', 'x' * 100), (good, '{}'), (good, ''), (good, ' ' * 5000), (': ', '\0 '), ('(1, 1)', '')):
+    shapes = ('(1, 1, 1, 1)', '(-1, -1)', '(1 1)', '[1, 1]', '(1.0, 1)', '(4294967296, 4294967296)', '(,1)', '',
+              '(1, 99999999999999999999)', '(32769, 1)', '(32768, 32768, 32768)', '(1, 1', '1')
+    for old, new in (*(('(1, 1)', shape) for shape in shapes), ("'shape'", "'form'"), ('False', 'Maybe'),
+                     ('False', 'True'), ("'<f4'", '<f4'), ("'<f4'", "'<f4"), ("'<f4'", "'|f4'"), ('<f4', 'x' * 100),
+                     ('}', ''), ('{', ''), (', }', ', } x'), (', }', ', }\0x'), (', }', ", 'shape': (1, 1)}"),
+                     (', }', ", 'more': 1}"), (': ', '\0 '), (good, '{}'), (good, ''), (good, ' ' * 5000)):
         assert old in good
         refused(converter, folder, 'a.npy', npy(good.replace(old, new), four))
     for version in (b'\0\0', b'\3\0', b'\1\1', b'\xff\xff'):
@@ -135,7 +135,7 @@ def check_damage(converter, folder):
         path, out = folder / ('a' + ending), folder / 'out.npy'
         converter.converted(folder / 'in.npy', path)
         good = path.read_bytes()
-        for length in [len(good)] * 150 + [random.integers(0, len(good)) for _ in range(50)]:
+        for length in [len(good)] * 90 + [random.integers(0, len(good)) for _ in range(30)]:
             bad = bytearray(good[:length])
             for at in random.integers(0, random.choice([128, 600, len(good)]), size=random.integers(1, 4)):
                 if at < length:
@@ -148,7 +148,7 @@ def check_damage(converter, folder):
             assert status != 0 or np.isfinite(np.load(out)).all()
             counts[ending, status] = counts.get((ending, status), 0) + 1
     print(counts)
-    assert all(counts[ending, 2] >= 50 for ending in ('.png', '.exr', '.npy')), counts
+    assert all(counts[ending, 2] >= 30 for ending in ('.png', '.exr', '.npy')), counts
 
 
 plain.run(check_png, check_jpeg, check_exr, check_npy, check_names, check_damage)

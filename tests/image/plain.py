@@ -34,18 +34,23 @@ def png(codes, colour_type, depth=8, extra=(), palette=None):
 
 
 def paeth(a, b, c):
-    p = int(a) + int(b) - int(c)
-    distances = abs(p - a), abs(p - b), abs(p - c)
-    return (a, b, c)[distances.index(min(distances))]
+    to_a, to_b, to_c = abs(b - c), abs(a - c), abs(a + b - 2 * c)
+    return a if to_a <= to_b and to_a <= to_c else b if to_b <= to_c else c
 
 
 def unfilter(kind, row, above, step):
-    """PNG specification, section 9.2; row and above are lists of bytes."""
-    for i in range(len(row)):
-        a = row[i - step] if i >= step else 0
-        c = above[i - step] if i >= step else 0
-        row[i] = (row[i] + (0, a, above[i], (a + above[i]) // 2, paeth(a, above[i], c))[kind]) & 255
-    return row
+    """PNG specification, section 9.2; row and above are arrays of bytes."""
+    if kind == 0:
+        return row
+    if kind == 1:
+        return np.cumsum(row.reshape(-1, step), axis=0, dtype='u1').reshape(-1)
+    if kind == 2:
+        return row + above
+    out, above = [0] * step + row.tolist(), [0] * step + above.tolist()  # with a black pixel before the row
+    for i in range(step, len(out)):
+        a, b = out[i - step], above[i]
+        out[i] = (out[i] + ((a + b) // 2 if kind == 3 else paeth(a, b, above[i - step]))) & 255
+    return np.array(out[step:], 'u1')
 
 
 def read_png(path):
@@ -63,13 +68,12 @@ def read_png(path):
     width, height, depth, colour_type, _, _, interlaced = header
     assert depth in (8, 16) and colour_type != 3 and not interlaced
     step = SAMPLES[colour_type] * depth // 8
-    flat, stride = zlib.decompress(packed), width * step + 1
-    rows, above = [], [0] * (stride - 1)
+    flat = np.frombuffer(zlib.decompress(packed), 'u1').reshape(height, width * step + 1)
+    rows = np.zeros((height + 1, width * step), 'u1')  # with a black row above
     for y in range(height):
-        above = unfilter(flat[y * stride], list(flat[y * stride + 1:(y + 1) * stride]), above, step)
-        rows.append(above)
+        rows[y + 1] = unfilter(flat[y, 0], flat[y, 1:], rows[y], step)
     kind = '>u2' if depth == 16 else 'u1'
-    return np.frombuffer(bytes(sum(rows, [])), kind).reshape(height, width, -1).astype(int), depth
+    return np.frombuffer(rows[1:].tobytes(), kind).reshape(height, width, -1).astype(int), depth
 
 
 def exr(image, kind):
