@@ -55,15 +55,19 @@ static clt_status present(clt_projector *projector, const float *codes, int64_t 
   return status;
 }
 
+static void destroy(simulated_projector *self) {
+  free(self->drive_of_code);
+  free(self->drive);
+  free(self);
+}
+
 static void close_projector(clt_projector *projector) {
   simulated_projector *self = (simulated_projector *)projector;
   if (self != NULL) {
     pthread_mutex_lock(&self->scene->lock);
     self->scene->projector_open = false;
     pthread_mutex_unlock(&self->scene->lock);
-    free(self->drive_of_code);
-    free(self->drive);
-    free(self);
+    destroy(self);
   }
 }
 
@@ -79,9 +83,7 @@ static simulated_projector *create(clt_scene *scene) {
   self->drive_of_code = clt_alloc((size_t)codes, sizeof(float));
   self->drive = clt_alloc(scene->timeline.values, sizeof(float));
   if (self->drive_of_code == NULL || self->drive == NULL) {
-    free(self->drive_of_code);
-    free(self->drive);
-    free(self);
+    destroy(self);
     return NULL;
   }
   self->base.driver = &driver;
@@ -102,9 +104,7 @@ clt_status clt_scene_open_projector(clt_scene *scene, clt_projector **out, clt_e
   scene->projector_open = true;
   pthread_mutex_unlock(&scene->lock);
   if (taken) {
-    free(self->drive_of_code);
-    free(self->drive);
-    free(self);
+    destroy(self);
     return clt_fail(error, CLT_BAD_INPUT, "the scene's projector is already open; close it first");
   }
   *out = &self->base;
