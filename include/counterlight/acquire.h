@@ -20,8 +20,8 @@ typedef struct clt_progress {
 
 typedef struct clt_acquire_options {
   const char *scheme; /* "brute", "hierarchical" or "auto" (NULL: auto) */
-  double threshold;   /* hierarchical: tau, the fraction of a cell's own light below which a block's light is not
-                         resolved further; 0..0.5, 0 means 0.002 */
+  double threshold;   /* hierarchical: tau, the fraction of a cell's light under the flood below which the light of a
+                         block that cannot be predicted is not resolved further; 0..0.5, 0 means 0.002 */
   int repeats;        /* observations averaged for black and flood, 1..256; 0 means 8 */
   int checks;         /* random check patterns observed at the end for provenance.error, 0..64 */
   unsigned seed;      /* of the check patterns */

@@ -2,6 +2,8 @@
 #ifndef COUNTERLIGHT_STATION_H
 #define COUNTERLIGHT_STATION_H
 
+#include <stdbool.h>
+
 #include "counterlight/acquire.h"
 #include "counterlight/rig.h"
 #include "counterlight/scene.h"
@@ -13,13 +15,15 @@ extern "C" {
 
 /* The part of a configuration file that names devices and how to measure with them. */
 typedef struct clt_station_config {
-  char
-      scene[CLT_PATH_MAX]; /* scene file for simulated devices, resolved against the configuration's folder; or empty */
-  char projector[32];      /* driver names: "simulated" */
+  char scene[CLT_PATH_MAX]; /* scene file for simulated devices, resolved against the configuration's folder; or "" */
+  char projector[32];       /* driver names: "simulated" */
   char camera[32];
-  clt_rig_config rig; /* what the file leaves out (width 0, no exposures, ...) is filled from the scene at opening */
-  char scheme[24];    /* of the acquisition: "auto", "brute", "hierarchical" */
-  clt_acquire_options acquire; /* scheme, progress and context are left to the caller */
+  /* What is 0 (sizes, exposure count, timeout, attempts), negative (latency) or not given (the curves) is filled from
+   * the scene when the rig is opened. */
+  clt_rig_config rig;
+  bool projector_response_given, camera_response_given; /* rig.projector, rig.camera come from the file */
+  char scheme[24];                                      /* of the acquisition: "auto", "brute", "hierarchical" */
+  clt_acquire_options acquire;                          /* scheme, progress and context are left to the caller */
 } clt_station_config;
 
 /* The settings that fit a scene file alone: simulated devices and the rig that suits them. */

@@ -1,0 +1,42 @@
+/* One acquisition under way: what its schemes share. */
+#ifndef CLT_ACQUIRE_SESSION_H
+#define CLT_ACQUIRE_SESSION_H
+
+#include "counterlight/acquire.h"
+
+typedef struct clt_session {
+  clt_rig *rig;
+  clt_acquire_options options; /* checked, defaults filled in */
+  clt_rig_info info;           /* of the rig, before the first pattern */
+  size_t cells;
+  clt_image drive;                 /* the next pattern; schemes write it */
+  clt_image seen, deviation;       /* the last observation */
+  clt_image black, black_variance; /* the mean of the repeats and the variance of that mean */
+  clt_image flood, flood_variance; /* likewise, the black subtracted; an infinite variance: not seen in any repeat */
+  clt_progress progress;
+  int64_t started_ns;
+} clt_session;
+
+/* A way to measure T. */
+typedef struct clt_scheme {
+  const char *name;
+  long (*patterns)(const clt_session *session); /* expected number, without black, flood and checks */
+  /* Measures a transport with black and flood already in the session; rows sum to the flood; sigma is kept. */
+  clt_status (*measure)(clt_session *session, clt_transport **out, clt_error *error);
+} clt_scheme;
+extern const clt_scheme clt_scheme_brute, clt_scheme_hierarchical;
+
+clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquire_options *options, clt_error *error);
+void clt_session_finish(clt_session *session); /* accepts a half-built one */
+
+/* Drives every cell of every channel with one value. */
+void clt_session_fill(clt_session *session, float value);
+/* Shows session->drive and observes it; counts it and reports progress. CLT_CANCELLED where the caller wants no more.
+ */
+clt_status clt_session_observe(clt_session *session, const char *phase, clt_error *error);
+/* Observes the drive options.repeats times: mean of the valid observations of each value and the variance of that mean
+ * (infinite where none was valid; the mean is then the last bound seen). */
+clt_status clt_session_average(clt_session *session, const char *phase, clt_image *mean, clt_image *variance,
+                               clt_error *error);
+
+#endif

@@ -1,0 +1,118 @@
+#include "counterlight/station.h"
+#include "support.h"
+
+static char folder[64], path[128];
+
+static clt_status read_text(const char *text, clt_station_config *config, clt_error *error) {
+  FILE *file = fopen(path, "w");
+  assert_non_null(file);
+  fputs(text, file);
+  fclose(file);
+  *error = (clt_error){0};
+  return clt_station_read(path, config, error);
+}
+
+static int make_folder(void **state) {
+  (void)state;
+  test_folder(folder);
+  snprintf(path, sizeof path, "%s/station.cfg", folder);
+  return 0;
+}
+
+static int remove_folder(void **state) {
+  (void)state;
+  unlink(path);
+  return rmdir(folder);
+}
+
+static void everything_is_read(void **state) {
+  (void)state;
+  clt_station_config config;
+  clt_error error;
+  const char *text = "scene = \"scenes/room.cfg\";\n"
+                     "projector = { driver = \"simulated\"; response = \"gamma 2.4\"; };\n"
+                     "camera = { driver = \"other\"; response = \"linear\"; };\n"
+                     "rig = { width = 64; height = 48; exposures_ms = (4, 16.5, 66); latency_ms = 0;\n"
+                     "        timeout_ms = 250; attempts = 5; };\n"
+                     "acquire = { scheme = \"brute\"; threshold = 0.01; repeats = 3; checks = 0; seed = 12; };\n"
+                     "daemon = { anything = { goes = \"here\"; }; };\n";
+  assert_ok(read_text(text, &config, &error), error);
+  char scene[160];
+  snprintf(scene, sizeof scene, "%s/scenes/room.cfg", folder);
+  assert_string_equal(config.scene, scene);
+  assert_string_equal(config.projector, "simulated");
+  assert_string_equal(config.camera, "other");
+  assert_true(config.projector_response_given && config.camera_response_given);
+  assert_int_equal(config.rig.projector.kind, CLT_CURVE_GAMMA);
+  assert_near(config.rig.projector.gamma, 2.4, 1e-12);
+  assert_int_equal(config.rig.camera.kind, CLT_CURVE_LINEAR);
+  assert_int_equal(config.rig.width, 64);
+  assert_int_equal(config.rig.height, 48);
+  assert_int_equal(config.rig.exposure_count, 3);
+  assert_near(config.rig.exposures_s[1], 0.0165, 1e-12);
+  assert_near(config.rig.latency_s, 0, 0);
+  assert_near(config.rig.timeout_s, 0.25, 1e-12);
+  assert_int_equal(config.rig.attempts, 5);
+  assert_string_equal(config.scheme, "brute");
+  assert_near(config.acquire.threshold, 0.01, 1e-12);
+  assert_int_equal(config.acquire.repeats, 3);
+  assert_int_equal(config.acquire.checks, 0);
+  assert_int_equal(config.acquire.seed, 12);
+}
+
+static void what_is_absent_is_left_to_the_scene(void **state) {
+  (void)state;
+  clt_station_config config;
+  clt_error error;
+  assert_ok(read_text("scene = \"/abs/room.cfg\";", &config, &error), error);
+  assert_string_equal(config.scene, "/abs/room.cfg");
+  assert_string_equal(config.projector, "simulated");
+  assert_false(config.projector_response_given || config.camera_response_given);
+  assert_true(config.rig.latency_s < 0);
+  assert_int_equal(config.rig.width + config.rig.exposure_count + config.rig.attempts, 0);
+  assert_string_equal(config.scheme, "auto");
+  clt_station_config plain;
+  assert_ok(clt_station_for_scene("/abs/room.cfg", &plain, &error), error);
+  assert_memory_equal(&plain, &config, sizeof plain);
+}
+
+static void mistakes_are_named(void **state) {
+  (void)state;
+  static const struct {
+    const char *text, *wanted;
+  } cases[] = {
+      {"scene = 5;", ":1: scene: must be a text"},
+      {"\nrig = { width = 0; height = 4; };", ":2: width: is 0; legal is 1 to 16384"},
+      {"rig = { width = 8; };", "needs both width and height"},
+      {"rig = { exposures_ms = [8.0, 4.0]; };", "exposures_ms: has 4 after 8"},
+      {"rig = { exposures_ms = [1, 2, 3, 4, 5, 6, 7, 8, 9]; };", "has 9 values; legal is 1 to 8"},
+      {"rig = { attempts = 0; };", "attempts: is 0; legal is 1 to 100"},
+      {"rig = { latency_ms = -1; };", "latency_ms: is -1; legal is 0 to 10000"},
+      {"rig = { timeout = 5; };", "timeout: is not a known key"},
+      {"projector = { response = \"cubic\"; };", "response: "},
+      {"camera = { driver = 5; };", "driver: must be a text"},
+      {"acquire = { scheme = \"magic\"; };", "is \"magic\"; legal is \"auto\", \"brute\", \"hierarchical\""},
+      {"acquire = { threshold = 0.7; };", "is 0.7; legal is 0 to 0.5"},
+      {"acquire = { checks = 65; };", "is 65; legal is 0 to 64"},
+      {"acquire = { seeds = 1; };", "seeds: is not a known key"},
+      {"deamon = { };", "deamon: is not a known key"},
+      {"rig = { width = ", "syntax error"},
+  };
+  for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+    clt_station_config config;
+    clt_error error;
+    assert_int_equal(read_text(cases[n].text, &config, &error), CLT_BAD_INPUT);
+    if (strstr(error.message, cases[n].wanted) == NULL || strstr(error.message, "station.cfg:") == NULL) {
+      fail_msg("%s gave \"%s\", wanted \"%s\"", cases[n].text, error.message, cases[n].wanted);
+    }
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(everything_is_read),
+      cmocka_unit_test(what_is_absent_is_left_to_the_scene),
+      cmocka_unit_test(mistakes_are_named),
+  };
+  return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
