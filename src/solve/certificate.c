@@ -7,7 +7,7 @@
 /* A cell is dark below this many standard deviations of its row, or below this share of the bright cells' F. */
 static const double DARK_SIGMAS = 5, DARK_SHARE = 1e-3, BRIGHT_QUANTILE = 0.9;
 static const double SHIFT = 0.05; /* of the power iteration, relative to the radius */
-enum { POWER_STEPS = 6 };
+enum { POWER_STEPS = 6, WORTH_SHARING = 65536 /* entries that pay for waking threads */ };
 
 struct clt_certificate {
   int channels;
@@ -81,7 +81,7 @@ static void apply_clipped(clt_system *system, const double *x, double *y) {
   }
   const double *drive = system->drive;
   size_t cols = system->cols;
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (cols * cols >= WORTH_SHARING)
   for (size_t i = 0; i < cols; i++) {
     const float *row = entries + i * cols;
     double sum = 0;
@@ -146,12 +146,22 @@ static void bound_radius(clt_system *system, void (*apply)(clt_system *, const d
   }
 }
 
+static bool has_negative_entry(const clt_system *system) {
+  const float *entries = clt_transport_entries(system->transport, system->channel);
+  for (size_t i = 0; entries != NULL && i < system->rows * system->cols; i++) {
+    if (entries[i] < 0 && system->lit[i / system->cols] && system->lit[i % system->cols]) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /* Where R has negative entries (noise) a dense T is bounded from above with them clipped to 0, and from below with them
  * kept: clipping only one sign of the noise adds up over a row and would refuse Jacobi where it converges. Other
  * storage has only the products, and with them both bounds of R as it stands. */
 static void certify_radius(clt_system *system, clt_channel_certificate *channel) {
   bound_radius(system, apply_averaged, &channel->radius_low, &channel->radius_high);
-  if (clt_transport_entries(system->transport, system->channel) != NULL) {
+  if (has_negative_entry(system)) {
     double low;
     bound_radius(system, apply_clipped, &low, &channel->radius_high);
     channel->radius_low = fmin(channel->radius_low, channel->radius_high);
