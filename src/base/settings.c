@@ -123,6 +123,16 @@ void clt_section_leave(clt_section section, const char *key) {
   }
 }
 
+void clt_section_leave_others(clt_section section, const char *key) {
+  int count = section.group != NULL ? config_setting_length(section.group) : 0;
+  for (int i = 0; i < count; i++) {
+    const char *name = config_setting_name(config_setting_get_elem(section.group, (unsigned)i));
+    if (strcmp(name, key) != 0) {
+      clt_section_leave(section, name);
+    }
+  }
+}
+
 clt_section clt_section_group(clt_section section, const char *key) {
   config_setting_t *member = find(section, key);
   if (member != NULL && !config_setting_is_group(member)) {

@@ -34,6 +34,8 @@ int clt_section_count(clt_section section, const char *key);
 clt_section clt_section_item(clt_section section, const char *key, int index);
 /* Leaves a key and all below it to another reader of the same file. */
 void clt_section_leave(clt_section section, const char *key);
+/* Leaves every key of the section but one to another reader. */
+void clt_section_leave_others(clt_section section, const char *key);
 
 double clt_read_number(clt_section section, const char *key, double fallback, double low, double high);
 int clt_read_integer(clt_section section, const char *key, int fallback, int low, int high);
