@@ -1,0 +1,279 @@
+/* Work given to the other threads, and its answers. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "base/log.h"
+#include "base/memory.h"
+#include "daemon/control.h"
+
+void control_measure(control *self, measure_kind kind) {
+  measure_job *job = clt_alloc(1, sizeof *job);
+  clt_error error = {0};
+  if (job == NULL) {
+    clt_log(CLT_LOG_ERROR, "a measurement cannot be started: out of memory");
+    return;
+  }
+  job->kind = kind;
+  job->number = ++self->work.number;
+  job->config = self->config.station;
+  job->station = self->found.devices.station;
+  job->projector = self->found.devices.projector;
+  if (kind == MEASURE_VERIFY && daemon_picture_copy(&self->found.picture, &job->picture, &error) != CLT_OK) {
+    clt_log(CLT_LOG_ERROR, "the picture cannot be verified: %s", error.message);
+    job->kind = MEASURE_NOTHING;
+  }
+  self->work.measure_number = job->number;
+  self->work.measuring = true;
+  clt_mailbox_put(self->boxes->measure_jobs, job);
+}
+
+static void fill_solve(const control *self, solver_job *job) {
+  const daemon_config *config = &self->config;
+  bool calibrated = self->found.calibrated;
+  const clt_projector_info *panel = &self->found.devices.projector;
+  job->width = calibrated ? self->found.width : panel->width;
+  job->height = calibrated ? self->found.height : panel->height;
+  job->channels = calibrated ? self->found.channels : panel->channels;
+  snprintf(job->source, sizeof job->source, "%s", self->found.source);
+  snprintf(job->method, sizeof job->method, "%s", config->method);
+  job->tolerance = config->solve.tolerance;
+  job->deadline_s = config->solve.deadline_s;
+  job->white = config->white;
+}
+
+static void fill_content(control *self, solver_job *job) {
+  control_wishes *wishes = &self->wishes;
+  job->descriptor = wishes->content_descriptor;
+  wishes->content_descriptor = -1;
+  snprintf(job->name, sizeof job->name, "%s", wishes->content_name);
+  snprintf(job->configured, sizeof job->configured, "%s", self->config.content);
+  self->work.content_ticket = wishes->content_ticket;
+}
+
+static clt_status fill_snapshot(control *self, solver_job *job, clt_error *error) {
+  self->work.snapshot_ticket = self->wishes.snapshot_ticket;
+  snprintf(job->response, sizeof job->response, "%s", self->found.response);
+  clt_status status = daemon_picture_copy(&self->found.picture, &job->picture, error);
+  return status == CLT_OK ? daemon_image_copy(&self->found.observation, &job->observation, error) : status;
+}
+
+static clt_status fill(control *self, solver_job *job, clt_error *error) {
+  switch (job->kind) {
+  case SOLVER_CONTENT:
+    fill_content(self, job);
+    return CLT_OK;
+  case SOLVER_SNAPSHOT:
+    return fill_snapshot(self, job, error);
+  case SOLVER_ADOPT:
+    job->transport = self->wishes.transport;
+    self->wishes.transport = NULL;
+    fill_solve(self, job);
+    return CLT_OK;
+  default:
+    fill_solve(self, job);
+    return CLT_OK;
+  }
+}
+
+/* Gives the solver the first of what is wanted, where it has nothing to do. */
+static void pump(control *self) {
+  if (self->work.solving || self->wishes.solver == 0 || self->state == STATE_STOPPING) {
+    return;
+  }
+  solver_job *job = clt_alloc(1, sizeof *job);
+  clt_error error = {0};
+  if (job == NULL) {
+    return;
+  }
+  while ((self->wishes.solver >> job->kind & 1u) == 0) {
+    job->kind++;
+  }
+  self->wishes.solver &= ~(1u << job->kind);
+  job->descriptor = -1;
+  job->number = ++self->work.number;
+  if (fill(self, job, &error) != CLT_OK) {
+    clt_log(CLT_LOG_ERROR, "the picture cannot be worked on: %s", error.message);
+    server_complete(self->service, WAITS_FOR_SNAPSHOT, self->work.snapshot_ticket, NULL, &error);
+    solver_job_free(job);
+    return;
+  }
+  self->work.solving = true;
+  clt_mailbox_put(self->boxes->solver_jobs, job);
+}
+
+void control_want(control *self, solver_kind kind) {
+  self->wishes.solver |= 1u << kind;
+  pump(self);
+}
+
+void control_on_opened(control *self, output_opened *letter) {
+  if (letter->error.status == CLT_OK) {
+    self->found.devices = *letter;
+    self->found.open = true;
+    self->found.gone = false;
+    control_event(self, EVENT_OPENED);
+    return;
+  }
+  bool lost = letter->error.status == CLT_GONE && self->found.open;
+  self->found.gone = self->found.gone || lost;
+  self->found.open = self->found.calibrated = false;
+  control_blame(self, &letter->error);
+  control_event(self, lost ? EVENT_LOST : EVENT_FAILED);
+}
+
+static void take_rig(control *self, const measure_result *letter) {
+  control_findings *found = &self->found;
+  found->width = letter->rig.width;
+  found->height = letter->rig.height;
+  found->channels = letter->rig.channels;
+  memcpy(found->response, letter->response, sizeof found->response);
+  memcpy(found->source, letter->source, sizeof found->source);
+  found->calibrated = true;
+}
+
+static machine_event take_verification(control *self, measure_result *letter) {
+  clt_image_finish(&self->found.observation);
+  self->found.observation = letter->observation;
+  letter->observation = (clt_image){0};
+  self->found.verified_error = letter->verified_error;
+  self->found.verified = time(NULL);
+  clt_log(CLT_LOG_INFO, "verified: the picture is %.2f %% off, %.2f %% was predicted", 100 * letter->verified_error,
+          100 * self->found.picture.compensation.error_after);
+  bool changed = self->config.reacquire_error > 0 && letter->verified_error > self->config.reacquire_error;
+  self->wishes.acquire = self->wishes.acquire || changed;
+  return changed ? EVENT_CHANGED : EVENT_VERIFIED;
+}
+
+static void take_measured(control *self, measure_result *letter) {
+  switch (letter->kind) {
+  case MEASURE_CALIBRATE:
+    take_rig(self, letter);
+    control_event(self, EVENT_CALIBRATED);
+    break;
+  case MEASURE_ACQUIRE:
+    clt_transport_destroy(self->wishes.transport);
+    self->wishes.transport = letter->transport;
+    letter->transport = NULL;
+    control_event(self, EVENT_ACQUIRED);
+    break;
+  case MEASURE_VERIFY:
+    control_event(self, take_verification(self, letter));
+    break;
+  default:
+    break;
+  }
+}
+
+void control_on_measured(control *self, measure_result *letter) {
+  if (letter->number != self->work.measure_number) {
+    return;
+  }
+  self->work.measuring = false;
+  if (self->wishes.open) {
+    self->wishes.open = false;
+    control_act(self, ACTION_OPEN);
+  }
+  if (letter->error.status == CLT_OK) {
+    take_measured(self, letter);
+  } else if (letter->error.status != CLT_CANCELLED) {
+    self->found.gone = self->found.gone || letter->error.status == CLT_GONE;
+    control_blame(self, &letter->error);
+    control_event(self, EVENT_FAILED);
+  }
+}
+
+/* The picture that was computed becomes the one that ACTION_SHOW puts up. */
+static void take_picture(control *self, solver_result *letter) {
+  daemon_picture_finish(&self->found.picture);
+  self->found.picture = letter->picture;
+  letter->picture = (daemon_picture){0};
+  self->found.picture_content = self->found.content_serial;
+  self->found.verified_error = -1;
+}
+
+static void take_content(control *self, const solver_result *letter) {
+  json_t *result = NULL;
+  if (letter->error.status == CLT_OK) {
+    snprintf(self->found.content, sizeof self->found.content, "%s", letter->content);
+    self->found.content_serial++;
+    control_event(self, EVENT_PICTURE);
+    result = json_pack("{s:s, s:s}", "content", letter->content, "state", machine_state_name(self->state));
+  } else {
+    clt_log(CLT_LOG_WARNING, "the picture stays: %s", letter->error.message);
+  }
+  server_complete(self->service, WAITS_FOR_CONTENT, self->work.content_ticket, result, &letter->error);
+  json_decref(result);
+}
+
+static void take_solved(control *self, solver_result *letter) {
+  if (letter->error.status != CLT_OK) {
+    control_blame(self, &letter->error);
+    control_event(self, EVENT_UNSOLVED);
+    return;
+  }
+  self->wishes.acquire = self->wishes.acquire && letter->kind != SOLVER_ADOPT;
+  take_picture(self, letter);
+  control_event(self, EVENT_SOLVED);
+}
+
+static void take_loaded(control *self, const solver_result *letter) {
+  if (letter->error.status != CLT_OK) {
+    clt_log(CLT_LOG_WARNING, "the stored transport cannot be used: %s", letter->error.message);
+  }
+  control_event(self, letter->facts.present ? EVENT_LOADED : EVENT_UNKNOWN);
+}
+
+static void take_prepared(control *self, solver_result *letter) {
+  if (letter->error.status != CLT_OK) {
+    clt_log(CLT_LOG_ERROR, "the uncompensated picture cannot be shown: %s", letter->error.message);
+    return;
+  }
+  take_picture(self, letter);
+  control_act(self, ACTION_SHOW);
+}
+
+static void take_snapshot(control *self, const solver_result *letter) {
+  json_t *result = NULL;
+  if (letter->error.status == CLT_OK) {
+    result = control_snapshot_note(self);
+  }
+  server_complete(self->service, WAITS_FOR_SNAPSHOT, self->work.snapshot_ticket, result, &letter->error);
+  json_decref(result);
+}
+
+void control_on_solved(control *self, solver_result *letter) {
+  self->work.solving = false;
+  self->found.transport = letter->facts;
+  switch (letter->kind) {
+  case SOLVER_CONTENT:
+    take_content(self, letter);
+    break;
+  case SOLVER_PREPARE:
+    take_prepared(self, letter);
+    break;
+  case SOLVER_LOAD:
+    take_loaded(self, letter);
+    break;
+  case SOLVER_ADOPT:
+  case SOLVER_SOLVE:
+    take_solved(self, letter);
+    break;
+  case SOLVER_SNAPSHOT:
+    take_snapshot(self, letter);
+    break;
+  default:
+    break;
+  }
+  pump(self);
+}
+
+void control_finish_jobs(control *self) {
+  clt_transport_destroy(self->wishes.transport);
+  if (self->wishes.content_descriptor >= 0) {
+    close(self->wishes.content_descriptor);
+  }
+  daemon_picture_finish(&self->found.picture);
+  clt_image_finish(&self->found.observation);
+}

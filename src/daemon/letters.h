@@ -1,0 +1,194 @@
+/* The daemon's threads, who owns what, and the letters between them.
+ *
+ *   main      (output.c)   opens and closes the station, owns the projector, presents; never waits for another thread
+ *                          for longer than one refresh
+ *   measure   (measure.c)  owns the station's camera and rig while it works on a job; its rig projects through a
+ *                          stand-in (standin.c) that hands each pattern to main
+ *   solver    (solver.c)   owns the content, the transport with its certificate, and the files of the state directory
+ *   control   (control.c)  owns the state machine, the control socket, signals, timers and the watchdog; decides what
+ *                          the others do and keeps copies of what they found
+ *
+ * A letter belongs to the sender until it is put, to the mailbox until it is taken, then to the receiver. Mailboxes
+ * keep the latest letter only, so:
+ *   - every job has a number, and its answer carries it: an answer with an older number is out of date and dropped;
+ *   - a newer job for `measure` cancels the one it works on (noticed at its next pattern);
+ *   - control gives `solver` a job only when it has answered the last one: no job of its is ever lost.
+ * Letters to control also count up the eventfd `wake`. */
+#ifndef CLT_DAEMON_LETTERS_H
+#define CLT_DAEMON_LETTERS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "base/mailbox.h"
+#include "counterlight/counterlight.h"
+
+typedef struct daemon_boxes {
+  clt_mailbox *orders;       /* control -> main: output_order */
+  clt_mailbox *drives;       /* control -> main: output_drive */
+  clt_mailbox *patterns;     /* measure -> main: output_pattern */
+  clt_mailbox *answers;      /* main -> measure: output_answer */
+  clt_mailbox *opened;       /* main -> control: output_opened */
+  clt_mailbox *frames;       /* main -> control: output_frames */
+  clt_mailbox *measure_jobs; /* control -> measure: measure_job */
+  clt_mailbox *progress;     /* measure -> control: measure_progress */
+  clt_mailbox *measured;     /* measure -> control: measure_result */
+  clt_mailbox *solver_jobs;  /* control -> solver: solver_job */
+  clt_mailbox *solved;       /* solver -> control: solver_result */
+  int wake;                  /* eventfd, non-blocking */
+} daemon_boxes;
+
+clt_status daemon_boxes_init(daemon_boxes *boxes, clt_error *error);
+void daemon_boxes_finish(daemon_boxes *boxes); /* accepts a half-made or zeroed one */
+/* Puts a letter for control into one of the boxes and wakes it. */
+void daemon_report(const daemon_boxes *boxes, clt_mailbox *box, void *letter);
+
+/* --- main --- */
+
+typedef enum output_order_kind { OUTPUT_OPEN, OUTPUT_REOPEN, OUTPUT_STOP } output_order_kind;
+typedef struct output_order {
+  output_order_kind kind; /* OPEN: where it is not open yet; REOPEN: close first (only while measure has no job) */
+  clt_station_config station;
+} output_order;
+
+/* A drive to show from now on: linear light; the panel is a whole multiple of its size, or of one channel. */
+typedef struct output_drive {
+  clt_image drive;
+  clt_curve response; /* of the panel */
+} output_drive;
+
+/* A picture of panel codes to show at once and until the next pattern; without codes: measuring has ended, the drive
+ * comes back. */
+typedef struct output_pattern {
+  float *codes; /* as clt_projector_driver.present takes them */
+} output_pattern;
+typedef struct output_answer {
+  int64_t shown_ns;
+  clt_error error; /* status CLT_OK: it is on the glass */
+} output_answer;
+
+/* What became of opening the devices, or (CLT_GONE) that the projector is no longer there. */
+typedef struct output_opened {
+  clt_error error; /* CLT_OK: open */
+  clt_station *station;
+  clt_projector_info projector;
+  char projector_name[32], camera_name[32];
+  clt_curve response; /* of the panel as far as it is known before the rig is */
+} output_opened;
+
+typedef struct output_frames {
+  uint64_t turns;     /* of the loop: its heartbeat */
+  uint64_t presented; /* pictures handed to the projector */
+  uint64_t late;      /* turns that took longer than 1.5 refreshes */
+  double fps;         /* over the last report's time */
+  bool picture;       /* a picture, not only patterns, has been up */
+  bool ended;         /* measure, solver and output have ended: the last report */
+} output_frames;
+
+/* --- measure --- */
+
+typedef enum measure_kind {
+  MEASURE_NOTHING,
+  MEASURE_CALIBRATE,
+  MEASURE_ACQUIRE,
+  MEASURE_VERIFY,
+  MEASURE_STOP
+} measure_kind;
+
+/* A drive with what it should look like, on the grid. */
+typedef struct daemon_picture {
+  clt_image drive;
+  clt_image target; /* wanted radiance; empty where the picture is uncompensated */
+  clt_image lit;    /* 1 where a cell takes part, else 0 */
+  bool compensated;
+  double white[CLT_CHANNELS_MAX];
+  clt_compensation compensation;
+} daemon_picture;
+
+typedef struct measure_job {
+  measure_kind kind;
+  uint64_t number;
+  clt_station_config config;    /* CALIBRATE, ACQUIRE */
+  clt_station *station;         /* CALIBRATE */
+  clt_projector_info projector; /* CALIBRATE */
+  daemon_picture picture;       /* VERIFY */
+} measure_job;
+
+typedef struct measure_progress {
+  uint64_t number;
+  char phase[48];
+  long done, total;
+  double seconds, left;
+} measure_progress;
+
+typedef struct measure_result {
+  measure_kind kind;
+  uint64_t number;
+  clt_error error;
+  clt_rig_info rig; /* CALIBRATE; its texts are the two below */
+  char response[32], source[CLT_TEXT_MAX];
+  clt_transport *transport; /* ACQUIRE */
+  clt_image observation;    /* VERIFY: radiance */
+  double verified_error;    /* VERIFY: ||y - target|| / ||target|| over lit cells */
+} measure_result;
+
+/* --- solver --- */
+
+typedef enum solver_kind {
+  SOLVER_CONTENT,  /* take other content */
+  SOLVER_PREPARE,  /* the stored drive where it still fits, else the uncompensated picture */
+  SOLVER_LOAD,     /* look for a stored transport */
+  SOLVER_ADOPT,    /* certify, solve with and store a new transport */
+  SOLVER_SOLVE,    /* compensate the content */
+  SOLVER_SNAPSHOT, /* write what is up as pictures */
+  SOLVER_STOP,
+  SOLVER_KINDS
+} solver_kind;
+
+typedef struct solver_job {
+  solver_kind kind;
+  uint64_t number;
+  int descriptor;                /* CONTENT: an open picture file; -1: go back to the configured one */
+  char name[CLT_PATH_MAX];       /* CONTENT: what people call it */
+  char configured[CLT_PATH_MAX]; /* CONTENT: what the configuration names */
+  int width, height, channels;   /* PREPARE: the panel; LOAD, SOLVE: the grid */
+  char source[CLT_TEXT_MAX];     /* LOAD: the rig */
+  char response[32];             /* SNAPSHOT */
+  char method[24];               /* SOLVE, ADOPT */
+  double tolerance, deadline_s;
+  clt_white white;
+  clt_transport *transport; /* ADOPT */
+  daemon_picture picture;   /* SNAPSHOT */
+  clt_image observation;    /* SNAPSHOT; may be empty */
+} solver_job;
+
+/* What is known of the transport in use. */
+typedef struct transport_facts {
+  bool present;
+  clt_transport_info info;
+  clt_provenance origin;
+} transport_facts;
+
+typedef struct solver_result {
+  solver_kind kind;
+  uint64_t number;
+  clt_error error;
+  daemon_picture picture;     /* PREPARE, SOLVE, ADOPT */
+  transport_facts facts;      /* LOAD, ADOPT, SOLVE */
+  char content[CLT_PATH_MAX]; /* CONTENT: its name */
+} solver_result;
+
+/* Deep copy; `to` is overwritten. CLT_FAILED where memory is short (then `to` is empty). */
+clt_status daemon_picture_copy(const daemon_picture *from, daemon_picture *to, clt_error *error);
+void daemon_picture_finish(daemon_picture *picture); /* accepts an empty one */
+clt_status daemon_image_copy(const clt_image *from, clt_image *to, clt_error *error);
+
+/* Frees of letters that hold more than themselves; each accepts NULL. */
+void output_drive_free(void *letter);
+void output_pattern_free(void *letter);
+void measure_job_free(void *letter);
+void measure_result_free(void *letter);
+void solver_job_free(void *letter);
+void solver_result_free(void *letter);
+
+#endif

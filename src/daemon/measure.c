@@ -1,0 +1,167 @@
+#include "daemon/measure.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "daemon/standin.h"
+
+/* The least time between two progress letters, s. */
+static const double progress_s = 0.05;
+
+typedef struct measurer {
+  const daemon_boxes *boxes;
+  clt_station *station;   /* lent by main from calibration on */
+  clt_projector *standin; /* outlives the station's rig */
+  measure_job *waiting;   /* came while another was worked on */
+  uint64_t number;        /* of the job in work */
+  int64_t reported_ns;
+} measurer;
+
+static bool cancelled(measurer *self) {
+  measure_job *newer = clt_mailbox_take(self->boxes->measure_jobs, 0);
+  if (newer != NULL) {
+    measure_job_free(self->waiting);
+    self->waiting = newer;
+  }
+  return self->waiting != NULL;
+}
+
+static bool on_progress(void *context, const clt_progress *progress) {
+  measurer *self = context;
+  bool due = self->reported_ns == 0 || clt_clock_since(self->reported_ns) >= progress_s;
+  measure_progress *letter = due ? clt_alloc(1, sizeof *letter) : NULL;
+  if (letter != NULL) {
+    *letter = (measure_progress){.number = self->number,
+                                 .done = progress->done,
+                                 .total = progress->total,
+                                 .seconds = progress->seconds,
+                                 .left = progress->left};
+    snprintf(letter->phase, sizeof letter->phase, "%s", progress->phase);
+    self->reported_ns = clt_clock_ns();
+    daemon_report(self->boxes, self->boxes->progress, letter);
+  }
+  return !cancelled(self);
+}
+
+/* The rig on main's station; one that is open already stays. */
+static clt_status calibrate(measurer *self, const measure_job *job, measure_result *result) {
+  clt_station *station = job->station;
+  if (station->rig == NULL) {
+    if (self->standin != NULL) {
+      self->standin->driver->close(self->standin);
+      self->standin = NULL;
+    }
+    clt_status status = standin_create(self->boxes, &job->projector, &self->standin, &result->error);
+    if (status != CLT_OK) {
+      return status;
+    }
+    status = clt_station_open_rig(&job->config, station, self->standin, &result->error);
+    if (status != CLT_OK) {
+      return status;
+    }
+  }
+  self->station = station;
+  station->rig->operations->describe(station->rig, &result->rig);
+  snprintf(result->response, sizeof result->response, "%s", result->rig.response);
+  snprintf(result->source, sizeof result->source, "%s", result->rig.source);
+  result->rig.response = result->response;
+  result->rig.source = result->source;
+  return CLT_OK;
+}
+
+static clt_status acquire(measurer *self, const measure_job *job, measure_result *result) {
+  clt_acquire_options options = job->config.acquire;
+  options.scheme = job->config.scheme[0] != '\0' ? job->config.scheme : NULL;
+  options.progress = on_progress;
+  options.context = self;
+  self->reported_ns = 0;
+  return clt_acquire(self->station->rig, &options, &result->transport, &result->error);
+}
+
+double measure_error(const clt_image *seen, const clt_image *deviation, const clt_image *target, const clt_image *lit) {
+  double difference = 0, wanted = 0;
+  for (size_t i = 0; i < clt_image_size(target); i++) {
+    if (lit->data[i] != 0 && isfinite(deviation->data[i])) {
+      double off = (double)seen->data[i] - target->data[i];
+      difference += off * off;
+      wanted += (double)target->data[i] * target->data[i];
+    }
+  }
+  return wanted > 0 ? sqrt(difference / wanted) : 0;
+}
+
+static clt_status verify(measurer *self, const measure_job *job, measure_result *result) {
+  const clt_image *drive = &job->picture.drive;
+  clt_image deviation = {0};
+  clt_rig *rig = self->station->rig;
+  clt_status status =
+      clt_image_init(&result->observation, drive->channels, drive->height, drive->width, &result->error);
+  status = status == CLT_OK ? clt_image_init(&deviation, drive->channels, drive->height, drive->width, &result->error)
+                            : status;
+  status = status == CLT_OK ? rig->operations->observe(rig, drive, &result->observation, &deviation, &result->error)
+                            : status;
+  if (status == CLT_OK) {
+    result->verified_error = measure_error(&result->observation, &deviation, &job->picture.target, &job->picture.lit);
+  }
+  clt_image_finish(&deviation);
+  return status;
+}
+
+static clt_status work(measurer *self, const measure_job *job, measure_result *result) {
+  bool observes = job->kind == MEASURE_ACQUIRE || job->kind == MEASURE_VERIFY;
+  if (observes && (self->station == NULL || self->station->rig == NULL)) {
+    return clt_fail(&result->error, CLT_GONE, "the rig is not open");
+  }
+  switch (job->kind) {
+  case MEASURE_CALIBRATE:
+    return calibrate(self, job, result);
+  case MEASURE_ACQUIRE:
+    return acquire(self, job, result);
+  case MEASURE_VERIFY:
+    return verify(self, job, result);
+  default:
+    return CLT_OK;
+  }
+}
+
+static void answer(measurer *self, const measure_job *job) {
+  measure_result *result = clt_alloc(1, sizeof *result);
+  if (result == NULL) {
+    clt_log(CLT_LOG_ERROR, "measuring: out of memory");
+    return;
+  }
+  result->kind = job->kind;
+  result->number = self->number = job->number;
+  result->error.status = work(self, job, result);
+  if (job->kind == MEASURE_ACQUIRE || job->kind == MEASURE_VERIFY) {
+    standin_release(self->boxes);
+  }
+  daemon_report(self->boxes, self->boxes->measured, result);
+}
+
+void *measure_run(void *boxes) {
+  measurer self = {.boxes = boxes};
+  bool stopping = false;
+  while (!stopping) {
+    measure_job *job = self.waiting != NULL ? self.waiting : clt_mailbox_take(self.boxes->measure_jobs, -1);
+    self.waiting = NULL;
+    stopping = job == NULL || job->kind == MEASURE_STOP;
+    if (!stopping) {
+      answer(&self, job);
+    }
+    measure_job_free(job);
+  }
+  if (self.station != NULL && self.station->rig != NULL) {
+    self.station->rig->operations->close(self.station->rig);
+    self.station->rig = NULL;
+  }
+  if (self.standin != NULL) {
+    self.standin->driver->close(self.standin);
+  }
+  return NULL;
+}

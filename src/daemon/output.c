@@ -1,0 +1,221 @@
+#include "daemon/output.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+#include "base/memory.h"
+
+/* The pace while no projector is open, s; and the time between reports. */
+static const double idle_refresh_s = 1.0 / 60, report_s = 0.25;
+
+struct output {
+  const daemon_boxes *boxes;
+  clt_station station;
+  bool open, stopping;
+  clt_projector_info panel;
+  clt_curve response;  /* of the panel, as far as it is known before the rig is */
+  output_drive *drive; /* the latest; survives a reopening */
+  float *codes;        /* of the drive on this panel */
+  bool measuring;      /* a pattern is on the glass and stays there */
+  output_frames frames;
+  int64_t reported_ns;
+  output_frames reported;
+};
+
+clt_status output_create(const daemon_boxes *boxes, output **out, clt_error *error) {
+  output *made = clt_alloc(1, sizeof *made);
+  if (made == NULL) {
+    return clt_fail(error, CLT_FAILED, "the output: out of memory");
+  }
+  made->boxes = boxes;
+  made->reported_ns = clt_clock_ns();
+  *out = made;
+  return CLT_OK;
+}
+
+static void close_station(output *main) {
+  clt_station_close(&main->station);
+  main->station = (clt_station){0};
+  main->open = main->measuring = false;
+}
+
+void output_destroy(output *main) {
+  if (main != NULL) {
+    close_station(main);
+    output_drive_free(main->drive);
+    free(main->codes);
+    free(main);
+  }
+}
+
+void output_encode(const output_drive *picture, const clt_projector_info *panel, float *codes) {
+  const clt_image *drive = &picture->drive;
+  for (int c = 0; c < panel->channels; c++) {
+    int from = c < drive->channels ? c : 0;
+    for (int y = 0; y < panel->height; y++) {
+      size_t row = ((size_t)from * drive->height + (size_t)y * drive->height / panel->height) * drive->width;
+      for (int x = 0; x < panel->width; x++) {
+        float light = drive->data[row + (size_t)x * drive->width / panel->width];
+        codes[((size_t)c * panel->height + y) * panel->width + x] = (float)clt_curve_encode(&picture->response, light);
+      }
+    }
+  }
+}
+
+/* Makes the drive's codes for the panel that is open. */
+static void encode_drive(output *main) {
+  free(main->codes);
+  main->codes = NULL;
+  if (!main->open || main->drive == NULL) {
+    return;
+  }
+  main->codes = clt_alloc((size_t)main->panel.channels * main->panel.height * main->panel.width, sizeof *main->codes);
+  if (main->codes == NULL) {
+    clt_log(CLT_LOG_ERROR, "no memory for a picture of %d x %d; the last one stays up", main->panel.width,
+            main->panel.height);
+    return;
+  }
+  output_encode(main->drive, &main->panel, main->codes);
+}
+
+/* The panel's response before the rig tells: the configuration's, or the one that the scene suggests. */
+static clt_curve known_response(const output *main, const clt_station_config *config) {
+  clt_rig_config suggested = config->rig;
+  if (main->station.scene != NULL && config->rig.width == 0) {
+    clt_scene_rig_config(main->station.scene, &suggested);
+  }
+  return suggested.projector;
+}
+
+static void report_opened(output *main, const clt_error *error) {
+  output_opened *letter = clt_alloc(1, sizeof *letter);
+  if (letter == NULL) {
+    return;
+  }
+  letter->error = *error;
+  letter->station = &main->station;
+  if (main->open) {
+    letter->projector = main->panel;
+    snprintf(letter->projector_name, sizeof letter->projector_name, "%s", main->station.projector->driver->name);
+    snprintf(letter->camera_name, sizeof letter->camera_name, "%s", main->station.camera->driver->name);
+    letter->response = main->response;
+  }
+  daemon_report(main->boxes, main->boxes->opened, letter);
+}
+
+static void open_station(output *main, const clt_station_config *config) {
+  clt_error error = {0};
+  if (!main->open && clt_station_open(config, &main->station, &error) == CLT_OK) {
+    main->open = true;
+    main->station.projector->driver->describe(main->station.projector, &main->panel);
+    main->response = known_response(main, config);
+    encode_drive(main);
+  }
+  if (error.status != CLT_OK) {
+    close_station(main);
+  }
+  report_opened(main, &error);
+}
+
+static void obey(output *main) {
+  output_order *order = clt_mailbox_take(main->boxes->orders, 0);
+  if (order == NULL) {
+    return;
+  }
+  if (order->kind == OUTPUT_STOP) {
+    main->stopping = true;
+  } else {
+    if (order->kind == OUTPUT_REOPEN) {
+      close_station(main);
+    }
+    open_station(main, &order->station);
+  }
+  free(order);
+}
+
+static void take_drive(output *main) {
+  output_drive *newer = clt_mailbox_take(main->boxes->drives, 0);
+  if (newer != NULL) {
+    output_drive_free(main->drive);
+    main->drive = newer;
+    encode_drive(main);
+  }
+}
+
+static clt_status present(output *main, const float *codes, int64_t *shown_ns, clt_error *error) {
+  clt_projector *projector = main->station.projector;
+  if (!main->open) {
+    return clt_fail(error, CLT_GONE, "the projector is not open");
+  }
+  clt_status status = projector->driver->present(projector, codes, shown_ns, error);
+  main->frames.presented += status == CLT_OK;
+  return status;
+}
+
+/* Shows a pattern at once and answers; or ends measuring, so that the drive is up again in this very turn. */
+static void take_pattern(output *main, output_pattern *pattern) {
+  output_answer *answer = pattern->codes != NULL ? clt_alloc(1, sizeof *answer) : NULL;
+  main->measuring = pattern->codes != NULL;
+  if (answer != NULL) {
+    answer->error.status = present(main, pattern->codes, &answer->shown_ns, &answer->error);
+    clt_mailbox_put(main->boxes->answers, answer);
+  }
+  output_pattern_free(pattern);
+}
+
+/* A projector that takes no picture any more is reported once: it counts as closed from then on. */
+static void show_drive(output *main) {
+  int64_t shown_ns;
+  clt_error error = {0};
+  if (main->codes == NULL || main->measuring || !main->open) {
+    return;
+  }
+  if (present(main, main->codes, &shown_ns, &error) == CLT_OK) {
+    main->frames.picture = true;
+    return;
+  }
+  clt_log(CLT_LOG_ERROR, "the projector takes no picture: %s", error.message);
+  error.status = CLT_GONE;
+  free(main->codes);
+  main->codes = NULL;
+  report_opened(main, &error);
+}
+
+/* Reports now and then, and at once when the first picture is up. */
+static void report_frames(output *main) {
+  double passed = clt_clock_since(main->reported_ns);
+  bool due = passed >= report_s || main->frames.picture != main->reported.picture;
+  output_frames *letter = due ? clt_alloc(1, sizeof *letter) : NULL;
+  if (letter == NULL) {
+    return;
+  }
+  main->frames.fps = (double)(main->frames.presented - main->reported.presented) / passed;
+  main->reported = main->frames;
+  main->reported_ns = clt_clock_ns();
+  *letter = main->frames;
+  daemon_report(main->boxes, main->boxes->frames, letter);
+}
+
+static void turn(output *main) {
+  double refresh_s = main->open && main->panel.refresh_s > 0 ? main->panel.refresh_s : idle_refresh_s;
+  int64_t start_ns = clt_clock_ns();
+  obey(main);
+  take_drive(main);
+  show_drive(main);
+  main->frames.turns++;
+  report_frames(main);
+  double left = refresh_s - clt_clock_since(start_ns);
+  main->frames.late += left < -0.5 * refresh_s;
+  output_pattern *pattern = clt_mailbox_take(main->boxes->patterns, left > 0 ? left : 0);
+  if (pattern != NULL) {
+    take_pattern(main, pattern);
+  }
+}
+
+void output_run(output *main) {
+  while (!main->stopping) {
+    turn(main);
+  }
+}

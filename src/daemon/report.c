@@ -1,0 +1,129 @@
+/* What clients are told. */
+#include <stdio.h>
+
+#include "base/file.h"
+#include "daemon/control.h"
+
+/* A time as 2026-01-31T12:00:00Z. */
+static json_t *iso_time(time_t when) {
+  char text[32];
+  struct tm parts;
+  gmtime_r(&when, &parts);
+  strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return json_string(text);
+}
+
+/* A number that is not known while it is negative. */
+static json_t *known(double value) {
+  return value >= 0 ? json_real(value) : json_null();
+}
+
+/* A text that is no UTF-8 (a path may be) is given as null. */
+static json_t *text_or_null(const char *text) {
+  json_t *made = text[0] != '\0' ? json_string(text) : NULL;
+  return made != NULL ? made : json_null();
+}
+
+json_t *control_state_note(const control *self) {
+  return json_pack("{s:s, s:o, s:o}", "state", machine_state_name(self->state), "since", iso_time(self->since), "why",
+                   text_or_null(self->why));
+}
+
+json_t *control_progress_note(const measure_progress *progress) {
+  return json_pack("{s:s, s:I, s:I, s:f, s:o}", "phase", progress->phase, "done", (json_int_t)progress->done, "total",
+                   (json_int_t)progress->total, "seconds", progress->seconds, "left", known(progress->left));
+}
+
+static json_t *transport_note(const transport_facts *transport) {
+  if (!transport->present) {
+    return json_null();
+  }
+  const clt_provenance *origin = &transport->origin;
+  json_t *acquired = origin->acquired > 0 ? iso_time((time_t)origin->acquired) : json_null();
+  json_t *note = json_pack("{s:{s:i, s:i, s:i}, s:o, s:i, s:o}", "grid", "width", transport->info.width, "height",
+                           transport->info.height, "channels", transport->info.channels, "acquired", acquired,
+                           "patterns", origin->patterns, "error", known(origin->error));
+  json_object_set_new(note, "seconds", json_real(origin->seconds));
+  json_object_set_new(note, "scheme", text_or_null(origin->scheme));
+  json_object_set_new(note, "source", text_or_null(origin->source));
+  return note;
+}
+
+static json_t *frame_note(const control_findings *found) {
+  const clt_compensation *made = &found->picture.compensation;
+  bool compensated = found->picture.compensated;
+  json_t *note = json_pack("{s:f, s:I, s:I, s:b}", "fps", found->frames.fps, "late", (json_int_t)found->frames.late,
+                           "presented", (json_int_t)found->frames.presented, "compensated", compensated);
+  json_object_set_new(note, "solve_ms", compensated ? known(1e3 * made->solve.seconds) : json_null());
+  json_object_set_new(note, "error", compensated ? known(made->error_after) : json_null());
+  json_object_set_new(note, "error_before", compensated ? known(made->error_before) : json_null());
+  json_object_set_new(note, "method", compensated ? json_string(made->solve.method) : json_null());
+  json_object_set_new(note, "verified_error", known(found->verified_error));
+  json_object_set_new(note, "verified", found->verified_error >= 0 ? iso_time(found->verified) : json_null());
+  return note;
+}
+
+/* What the present accuracy costs, and what limits it. */
+static void cost_sentence(const control_findings *found, char *text, size_t size) {
+  const clt_compensation *made = &found->picture.compensation;
+  if (!found->picture.compensated) {
+    snprintf(text, size, "the picture is not compensated: that costs nothing, and interreflection stays");
+    return;
+  }
+  int used = snprintf(text, size, "%.2g %% error costs %.3g ms a picture by %s", 100 * made->error_after,
+                      1e3 * made->solve.seconds, made->solve.method);
+  if (found->transport.origin.error >= 0 && used > 0 && (size_t)used < size) {
+    snprintf(text + used, size - (size_t)used, "; the acquisition's own error is %.2g %%",
+             100 * found->transport.origin.error);
+  }
+}
+
+static json_t *devices_note(const control_findings *found) {
+  if (!found->open) {
+    return json_null();
+  }
+  const clt_projector_info *panel = &found->devices.projector;
+  return json_pack("{s:s, s:s, s:o, s:[i, i], s:f}", "projector", found->devices.projector_name, "camera",
+                   found->devices.camera_name, "source", text_or_null(found->source), "panel", panel->width,
+                   panel->height, "refresh_hz", panel->refresh_s > 0 ? 1 / panel->refresh_s : 0.0);
+}
+
+json_t *control_status(const control *self) {
+  char cost[CLT_MESSAGE_MAX];
+  json_t *status = control_state_note(self);
+  cost_sentence(&self->found, cost, sizeof cost);
+  json_object_set_new(status, "version", json_string(CLT_VERSION));
+  json_object_set_new(status, "content", text_or_null(self->found.content));
+  json_object_set_new(status, "transport", transport_note(&self->found.transport));
+  json_object_set_new(status, "frame", frame_note(&self->found));
+  json_object_set_new(status, "cost", json_string(cost));
+  json_object_set_new(status, "devices", devices_note(&self->found));
+  bool acquiring = self->state == STATE_ACQUIRING && self->found.progress.number != 0;
+  json_object_set_new(status, "progress", acquiring ? control_progress_note(&self->found.progress) : json_null());
+  return status;
+}
+
+static json_t *snapshot_path(const control *self, const char *name, bool there) {
+  char path[CLT_PATH_MAX];
+  return there && clt_file_join(self->config.state, name, path, NULL) == CLT_OK ? text_or_null(path) : json_null();
+}
+
+json_t *control_snapshot_note(const control *self) {
+  const control_findings *found = &self->found;
+  return json_pack("{s:o, s:o, s:o}", "target",
+                   snapshot_path(self, "snapshot/target.png", found->picture.target.data != NULL), "drive",
+                   snapshot_path(self, "snapshot/drive.png", true), "observation",
+                   snapshot_path(self, "snapshot/observation.png", found->observation.data != NULL));
+}
+
+void control_status_line(const control *self, char *line, size_t size) {
+  const char *name = machine_state_name(self->state);
+  if (self->state == STATE_SHOWING && self->found.picture.compensated) {
+    snprintf(line, size, "%s %s, %.2g %% error", name, self->found.content,
+             100 * self->found.picture.compensation.error_after);
+  } else if (self->state == STATE_HOLDING && self->why[0] != '\0') {
+    snprintf(line, size, "%s: %s", name, self->why);
+  } else {
+    snprintf(line, size, "%s", name);
+  }
+}
