@@ -7,14 +7,16 @@
 #include "counterlight/solve.h"
 #include "support.h"
 
-/* What to make. A closed room's form factors sum to 1 in every row. */
+/* What to make. A closed room's form factors sum to 1 in every row. Light goes from every cell to every other at
+ * random; between the faces of a cube (width = 6 height); or at random between two plates, the halves of the cells,
+ * only. */
 typedef struct recipe {
   int width, height, channels;
   uint64_t seed;
   double albedo[CLT_CHANNELS_MAX]; /* of every cell, if spread is 0 */
   double spread;                   /* cells' albedos vary by this factor below albedo */
   double openness;                 /* share of the light that leaves the room */
-  bool cube;                       /* the faces of a cube (width = 6 height) in place of a random exchange of light */
+  enum { SHAPE_RANDOM, SHAPE_CUBE, SHAPE_PLATES } shape;
 } recipe;
 
 /* T as float32 entries, as the transport holds them, and what made them. Arrays are channel after channel. */
@@ -59,16 +61,23 @@ static inline double room_cube_exchange(size_t side, size_t i, size_t j) {
   return from > 1e-12 && to > 1e-12 ? from * to / (M_PI * square * square) : 0;
 }
 
+static inline double room_exchange(const recipe *made, size_t i, size_t j, double u) {
+  size_t half = (size_t)made->width * (size_t)made->height / 2;
+  if (made->shape == SHAPE_CUBE) {
+    return room_cube_exchange((size_t)made->height, i, j);
+  }
+  return made->shape == SHAPE_PLATES && (i < half) == (j < half) ? 0 : 0.02 + u * u;
+}
+
 /* G with a_i G_ij = a_j G_ji > 0 and row sums 1 - openness: a symmetric kernel E scaled to D E D (Sinkhorn). */
 static inline void room_form_factors(const recipe *made, uint64_t *random, double *area, double *g) {
   size_t n = (size_t)made->width * (size_t)made->height;
   double *scale = room_numbers(n);
   for (size_t i = 0; i < n; i++) {
-    area[i] = made->cube ? 1 : 0.5 + 1.5 * test_random(random);
+    area[i] = made->shape == SHAPE_CUBE ? 1 : 0.5 + 1.5 * test_random(random);
     scale[i] = 1;
     for (size_t j = 0; j < i; j++) {
-      double u = test_random(random);
-      g[i * n + j] = g[j * n + i] = made->cube ? room_cube_exchange((size_t)made->height, i, j) : 0.02 + u * u;
+      g[i * n + j] = g[j * n + i] = room_exchange(made, i, j, test_random(random));
     }
   }
   for (int pass = 0; pass < 200; pass++) {
@@ -155,7 +164,7 @@ static inline test_room room_cube(int side, double albedo, double spread, uint64
                             .seed = seed,
                             .albedo = {albedo},
                             .spread = spread,
-                            .cube = true});
+                            .shape = SHAPE_CUBE});
 }
 
 static inline void room_free(test_room *room) {

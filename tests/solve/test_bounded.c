@@ -155,12 +155,12 @@ static void random_problems_reach_the_optimum(void **state) {
 static void clamping_is_far_worse_on_a_checkerboard(void **state) {
   (void)state;
   double worst = 1;
-  for (int squares = 1; squares <= 4; squares *= 2) {
-    test_room room = room_cube(8, .95, 0, 3);
+  for (int squares = 1; squares <= 3; squares++) {
+    test_room room = room_cube(6, .95, 0, 3);
     double *b = room_numbers(room.cells), *x = room_numbers(room.cells);
     const double *f = clt_certificate_first_bounce(room.certificate, 0);
     for (size_t i = 0; i < room.cells; i++) {
-      size_t row = i / 48, column = i % 48;
+      size_t row = i / 36, column = i % 36;
       b[i] = (row / (size_t)squares + column / (size_t)squares) % 2 ? f[i] * 2 : 0;
     }
     problem p = problem_of(&room, b);

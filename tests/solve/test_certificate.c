@@ -59,6 +59,18 @@ static void assert_bounds_hold(const test_room *room, double slack) {
   assert_true(channel->norm_high >= norm * (1 - 1e-9));
 }
 
+/* Case 4: light alternates between two plates, and A has the eigenvalues +-m. */
+static test_room room_plates(double albedo, uint64_t seed) {
+  return room_make((recipe){.width = 8,
+                            .height = 6,
+                            .channels = 1,
+                            .seed = seed,
+                            .albedo = {albedo},
+                            .spread = .4,
+                            .openness = .1,
+                            .shape = SHAPE_PLATES});
+}
+
 static void bounds_hold_the_true_radius_and_norm(void **state) {
   (void)state;
   for (uint64_t seed = 1; seed <= 4; seed++) {
@@ -68,6 +80,9 @@ static void bounds_hold_the_true_radius_and_norm(void **state) {
     test_room cube = room_cube(4, albedo, .5, seed);
     assert_bounds_hold(&random, .01);
     assert_bounds_hold(&cube, .01);
+    test_room plates = room_plates(albedo, seed);
+    assert_bounds_hold(&plates, .02);
+    room_free(&plates);
     room_free(&random);
     room_free(&cube);
   }
@@ -141,11 +156,11 @@ static void jacobi_is_certified_below_one_half(void **state) {
 static void flux_weights_are_recovered(void **state) {
   (void)state;
   for (uint64_t seed = 1; seed <= 4; seed++) {
-    test_room rooms[2] = {
+    test_room rooms[3] = {
         room_make((recipe){
             .width = 8, .height = 6, .channels = 1, .seed = seed, .albedo = {.9}, .spread = .7, .openness = .1}),
-        room_cube(5, .3 + .15 * (double)seed, .6, seed)};
-    for (int k = 0; k < 2; k++) {
+        room_cube(5, .3 + .15 * (double)seed, .6, seed), room_plates(.2 * (double)seed, seed)};
+    for (int k = 0; k < 3; k++) {
       const double *w = clt_certificate_flux(rooms[k].certificate, 0);
       double mean = 0, known = 0;
       for (size_t i = 0; i < rooms[k].cells; i++) {

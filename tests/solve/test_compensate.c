@@ -30,7 +30,7 @@ static test_room colour_room(double albedo, uint64_t seed) {
                             .seed = seed,
                             .albedo = {albedo, .8 * albedo, .5 * albedo},
                             .spread = .3,
-                            .cube = true});
+                            .shape = SHAPE_CUBE});
 }
 
 /* ||gain (b0 + T x) - target|| / ||target|| over lit cells, with the best gain where asked. */
