@@ -68,10 +68,10 @@ void clt_appearance_finish(clt_appearance *appearance) {
 
 /* seen += T drive over the driven cells. Threads share out the rows, so that each row's sum has one order. */
 static void add_columns(clt_appearance *appearance, const float *columns, size_t driven) {
-  enum { STRIP = 256 };
+  enum { STRIP = 256, FEW_PRODUCTS = 1 << 19 };
   size_t cells = appearance->cells;
   double *seen = appearance->seen;
-#pragma omp parallel for schedule(static) if (cells > 2 * STRIP)
+#pragma omp parallel for schedule(static) if (driven * cells > FEW_PRODUCTS)
   for (size_t strip = 0; strip < cells; strip += STRIP) {
     size_t end = strip + STRIP < cells ? strip + STRIP : cells;
     for (size_t k = 0; k < driven; k++) {

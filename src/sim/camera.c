@@ -6,7 +6,8 @@
 #include "sim/shutter.h"
 #include "sim/state.h"
 
-enum { FEW_VALUES = 1024 }; /* that more threads than one would only slow down */
+/* Samples of a frame that one thread forms sooner than several have met on a busy machine. */
+enum { FEW_SAMPLES = 1 << 16 };
 
 typedef struct simulated_camera {
   clt_camera base;
@@ -52,7 +53,6 @@ static clt_status set_exposure(clt_camera *camera, double seconds, clt_error *er
 static void expect_electrons(simulated_camera *self, double exposure_s) {
   const clt_camera_description *sensor = &self->scene->description.camera;
   double gain = self->scene->responsivity * exposure_s * sensor->full_well;
-#pragma omp parallel for schedule(static) if (self->values > FEW_VALUES)
   for (size_t k = 0; k < self->values; k++) {
     self->electrons[k] = fmax(0.0, gain * (double)self->radiance[k]);
     self->none[k] = exp(-self->electrons[k]);
@@ -75,7 +75,7 @@ static void form_samples(simulated_camera *self, uint32_t sequence) {
   uint64_t key = clt_noise_key(description->seed, sequence);
   int channels = description->channels, pixels = sensor->cell_pixels;
   size_t cells = self->values / (size_t)channels;
-#pragma omp parallel for schedule(static) if (self->values > FEW_VALUES)
+#pragma omp parallel for schedule(static) if (self->width * self->height * channels > FEW_SAMPLES)
   for (int y = 0; y < self->height; y++) {
     size_t sample = (size_t)y * (size_t)self->width * (size_t)channels;
     for (int x = 0; x < self->width; x++) {

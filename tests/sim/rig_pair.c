@@ -16,8 +16,13 @@ rig_pair pair_open(const char *settings) {
   room made;
   room_make(&made, text);
   room_add_transport(&made, 4, 3, 1, diagonal, 0.0f);
-  rig_pair pair = {.scene = room_open(&made)};
+  clt_scene *scene = room_open(&made);
   room_remove(&made);
+  return pair_of(scene);
+}
+
+rig_pair pair_of(clt_scene *scene) {
+  rig_pair pair = {.scene = scene};
   clt_error error = {.status = CLT_OK};
   assert_ok(clt_scene_open_projector(pair.scene, &pair.projector, &error), error);
   assert_ok(clt_scene_open_camera(pair.scene, &pair.camera, &error), error);

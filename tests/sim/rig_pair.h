@@ -15,6 +15,8 @@ typedef struct rig_pair {
 
 /* settings: further lines of the scene file. Without any: no ambient, no panel black, linear 16-bit panel. */
 rig_pair pair_open(const char *settings);
+/* The same around a scene of any size, which pair_close closes. */
+rig_pair pair_of(clt_scene *scene);
 void pair_close(rig_pair *pair);
 
 /* Shows codes (the same in every cell for pair_show_level); returns when the refresh starts. */

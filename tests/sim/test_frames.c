@@ -148,36 +148,49 @@ static void old_light_until_latency(void **state) {
   pair_close(&pair);
 }
 
-/* The bytes of a few frames under a fixed course of patterns. */
-static void record(uint16_t *samples, int threads, int seed) {
+enum { RECORD_FRAMES = 3, RECORD_SAMPLES = 32 * 24 * 36 * 3 };
+
+/* A few frames of two walls, large enough that threads share them out, under a fixed course of patterns. */
+static uint16_t *record(int threads, int seed) {
   omp_set_num_threads(threads);
-  char text[300];
-  snprintf(text, sizeof text, PLAIN_PANEL "seed = %d; camera = { cell_pixels = 5; };", seed);
-  rig_pair pair = pair_open(text);
-  for (int n = 0; n < 4; n++) {
-    clt_frame frame = pair_frame(&pair, pair_show_level(&pair, 0.2f * (float)n) + SETTLED);
-    memcpy(&samples[n * 300], frame.samples, 300 * sizeof *samples);
+  char text[600];
+  snprintf(text, sizeof text,
+           "seed = %d; grid = { width = 32; height = 24; }; camera = { cell_pixels = 6; }; "
+           "materials = ( { name = \"m\"; albedo = 0.6; } ); "
+           "surfaces = ( { corner = [-2, -2, -2]; u = [2, 2, 0]; v = [0, 0, 4]; material = \"m\"; }, "
+           "{ corner = [0, 0, -2]; u = [2, -2, 0]; v = [0, 0, 4]; material = \"m\"; } );",
+           seed);
+  room made;
+  room_make(&made, text);
+  rig_pair pair = pair_of(room_open(&made));
+  room_remove(&made);
+  uint16_t *samples = calloc((size_t)RECORD_FRAMES * RECORD_SAMPLES, sizeof *samples);
+  float codes[32 * 24 * 3];
+  for (int n = 0; n < RECORD_FRAMES; n++) {
+    for (int k = 0; k < 32 * 24 * 3; k++) {
+      codes[k] = (float)((k * (n + 1)) % 11) / 10.0f;
+    }
+    clt_frame frame = pair_frame(&pair, pair_show(&pair, codes) + SETTLED);
+    assert_int_equal(frame.width * frame.height * frame.channels, RECORD_SAMPLES);
+    memcpy(&samples[n * RECORD_SAMPLES], frame.samples, RECORD_SAMPLES * sizeof *samples);
   }
   pair_close(&pair);
+  return samples;
 }
 
 static void same_seed_same_frames(void **state) {
   (void)state;
-  enum { SAMPLES = 1200 };
-  uint16_t one[SAMPLES], four[SAMPLES], again[SAMPLES], other[SAMPLES];
-  int threads = omp_get_max_threads();
-  record(one, 1, 7);
-  record(four, 4, 7);
-  record(again, 4, 7);
-  record(other, 4, 8);
+  int threads = omp_get_max_threads(), different = 0;
+  uint16_t *one = record(1, 7), *four = record(4, 7), *other = record(4, 8);
   omp_set_num_threads(threads);
-  assert_memory_equal(one, four, sizeof one);
-  assert_memory_equal(one, again, sizeof one);
-  int different = 0;
-  for (int k = 0; k < SAMPLES; k++) {
+  assert_memory_equal(one, four, (size_t)RECORD_FRAMES * RECORD_SAMPLES * sizeof *one);
+  for (int k = 0; k < RECORD_FRAMES * RECORD_SAMPLES; k++) {
     different += one[k] != other[k];
   }
-  assert_true(different > SAMPLES / 2);
+  assert_true(different > RECORD_FRAMES * RECORD_SAMPLES / 2);
+  free(one);
+  free(four);
+  free(other);
 }
 
 /* The settings that the scene suggests: whole refresh periods, nothing saturated in the shortest at full drive. */

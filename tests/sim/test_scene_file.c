@@ -1,5 +1,12 @@
 #include "room.h"
 
+/* libconfig 1.5 leaks the text before a syntax error; the leak sanitizer, where it is there, asks for what to ignore.
+ */
+const char *__lsan_default_suppressions(void);
+const char *__lsan_default_suppressions(void) {
+  return "leak:libconfig";
+}
+
 #define GRID "grid = { width = 4; height = 3; channels = 3; }; "
 #define WHITE "materials = ( { name = \"white\"; albedo = 0.7; } ); "
 #define WALL "surfaces = ( { corner = [-2, 0, -2]; u = [4, 0, 0]; v = [0, 0, 4]; material = \"white\"; } ); "
@@ -77,23 +84,22 @@ static void mistakes_are_refused(void **state) {
   }
 }
 
-/* Bytes changed, dropped and doubled at random: read or refused with a message, never worse. Quotes stay, for libconfig
- * 1.5 leaks an unterminated text. */
+/* Bytes changed, dropped and doubled at random: read or refused with a message, never worse. */
 static void damaged_files(void **state) {
   (void)state;
   const char *const sound =
       GRID "projector = { tangent = [0.5, 0.4]; }; camera = { bits = 12; }; ambient = [0.1, 0.2, 0.3]; " WHITE WALL;
-  const char signs[] = ";:=,.(){}[]#-+019eExaw ";
+  const char signs[] = ";:=,.(){}[]#-+019eExaw \"\\@/*";
   uint64_t random = 11;
   for (int n = 0; n < 300; n++) {
     char text[1000];
     snprintf(text, sizeof text, "%s", sound);
     for (int k = 0; k < 3; k++) {
       size_t length = strlen(text), at = (size_t)(test_random(&random) * (double)(length - 1));
-      double what = text[at] == '"' ? 1.0 : test_random(&random);
+      double what = test_random(&random);
       if (what < 0.4) {
         text[at] = signs[(size_t)(test_random(&random) * (double)(sizeof signs - 1))];
-      } else if (what < 1.0) {
+      } else {
         memmove(&text[at + (what > 0.7)], &text[at + (what <= 0.7)], length - at);
       }
     }
