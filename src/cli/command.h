@@ -4,6 +4,7 @@
 
 #include <jansson.h>
 #include <stdbool.h>
+#include <stdio.h>
 
 #include "counterlight/status.h"
 
@@ -36,18 +37,36 @@ typedef struct cli_command {
   int positional_least, positional_most;
   /* Returns an exit code. What fails is said once, by cli_fail. */
   int (*run)(const struct cli_command *command, const cli_arguments *arguments);
+  const char *notes; /* what --help says after the options, lines ended by \n; or NULL */
 } cli_command;
+
+/* Reads the count words after the command's name into arguments, whose texts point into words. *wants_help where one
+ * of them is --help (the rest is then not checked). CLT_BAD_INPUT for an unknown option, a missing or surplus argument
+ * and too few or too many positional words. */
+clt_status cli_parse(const cli_command *command, int count, char *const *words, cli_arguments *arguments,
+                     bool *wants_help, clt_error *error);
+/* Writes the command's manual (usage, options, notes) to stream. */
+void cli_help(const cli_command *command, FILE *stream);
 
 /* The argument of the option called name, or NULL where it was not given. */
 const char *cli_value(const cli_command *command, const cli_arguments *arguments, const char *name);
 /* Reads a number option within low..high into *value (left as it is where the option is absent). */
 clt_status cli_number(const cli_command *command, const cli_arguments *arguments, const char *name, double low,
                       double high, double *value, clt_error *error);
+/* The same for whole numbers. */
+clt_status cli_integer(const cli_command *command, const cli_arguments *arguments, const char *name, int low, int high,
+                       int *value, clt_error *error);
+/* The argument of an option that must be given; CLT_BAD_INPUT where it was not. */
+clt_status cli_required(const cli_command *command, const cli_arguments *arguments, const char *name,
+                        const char **value, clt_error *error);
 
 /* Prints "counterlight NAME: message" on stderr; returns CLI_BAD_USAGE for CLT_BAD_INPUT, else CLI_FAILED. */
 int cli_fail(const cli_command *command, const clt_error *error);
 /* Prints one JSON document on stdout and frees it. Returns CLI_DONE, or CLI_FAILED where stdout cannot be written. */
 int cli_print_json(json_t *document);
+
+extern const cli_command cli_command_demo, cli_command_acquire, cli_command_compensate, cli_command_relight,
+    cli_command_inspect, cli_command_simulate;
 
 /* The commands that talk to a running daemon (client.c): status reacquire show watch snapshot hold resume reload. */
 extern const cli_command cli_command_status, cli_command_reacquire, cli_command_show, cli_command_watch,

@@ -1,0 +1,126 @@
+/* counterlight relight: what the room looks like under a drive, or the projector's view of light from the camera. */
+#include <stdlib.h>
+
+#include "base/memory.h"
+#include "cli/answer.h"
+#include "cli/command.h"
+#include "cli/transport_input.h"
+
+static const cli_option options[] = {
+    {"light", 'l', "PIC", "the drive, or with --dual the light at the camera"},
+    {"output", 'o', "OUT", "where the picture goes (.png, .exr, .npy)"},
+    {"dual", 0, NULL, "transposed product: the view from the projector"},
+    {"scale", 0, "X", "radiance of white in a .png (default: the median direct light)"},
+    {NULL, 0, NULL, NULL},
+};
+
+static const char notes[] =
+    "Writes b0 + T x, with --dual T' x (Helmholtz reciprocity: lit from the camera, seen by the projector).\n"
+    "A .png or .jpg light holds panel values and is decoded by the projector's response curve that the\n"
+    "transport file names (sRGB where it names none, and with --dual); .exr and .npy are linear.\n"
+    "A .png result is divided by white (--scale) and sRGB-encoded; .exr and .npy hold the radiance.\n";
+
+typedef struct task {
+  const char *light, *output;
+  bool dual;
+  cli_input input;
+  clt_image drive, seen;
+} task;
+
+static clt_status read_options(const cli_command *command, const cli_arguments *arguments, task *t, clt_error *error) {
+  clt_status status = cli_required(command, arguments, "light", &t->light, error);
+  if (!status) {
+    status = cli_required(command, arguments, "output", &t->output, error);
+  }
+  t->dual = cli_value(command, arguments, "dual") != NULL;
+  return status ? status : cli_picture_output_check(t->output, error);
+}
+
+/* x = T' y per channel: what a lamp at the projector would be seen to receive from light y at the camera. */
+static clt_status apply_dual(const clt_transport *transport, const clt_image *light, clt_image *seen,
+                             clt_error *error) {
+  clt_transport_info info = clt_transport_describe(transport);
+  double *y = clt_alloc(info.rows, sizeof *y), *x = clt_alloc(info.cols, sizeof *x);
+  clt_status status = CLT_OK;
+  if (!y || !x) {
+    status = clt_fail(error, CLT_FAILED, "out of memory for %zu cells", info.rows);
+  } else if (info.rows != info.cols) {
+    status = clt_fail(error, CLT_BAD_INPUT, "--dual needs a transport whose camera shares the projector's grid");
+  } else {
+    status = clt_image_init(seen, info.channels, info.height, info.width, error);
+  }
+  for (int c = 0; !status && c < info.channels; c++) {
+    for (size_t i = 0; i < info.rows; i++) {
+      y[i] = light->data[(size_t)c * info.rows + i];
+    }
+    clt_transport_apply_transposed(transport, c, y, x);
+    for (size_t i = 0; i < info.cols; i++) {
+      seen->data[(size_t)c * info.cols + i] = (float)x[i];
+    }
+  }
+  free(y);
+  free(x);
+  return status;
+}
+
+static clt_status relight(task *t, clt_error *error) {
+  const clt_curve *curve = t->dual ? NULL : &t->input.response;
+  clt_status status = cli_picture_read(t->light, curve, &t->input.grid, &t->drive, error);
+  if (status) {
+    return status;
+  }
+  return t->dual ? apply_dual(t->input.transport, &t->drive, &t->seen, error)
+                 : clt_predict(t->input.transport, &t->drive, &t->seen, error);
+}
+
+static clt_status write_result(const cli_command *command, const cli_arguments *arguments, task *t, clt_error *error) {
+  double scale = 0;
+  clt_status status = cli_number(command, arguments, "scale", 1e-30, 1e30, &scale, error);
+  for (int c = 0; scale > 0 && c < t->input.grid.channels; c++) {
+    t->input.white[c] = scale;
+  }
+  return status ? status : cli_radiance_write(t->output, &t->seen, t->input.white, error);
+}
+
+static int answer(const cli_arguments *arguments, const task *t) {
+  if (arguments->json) {
+    return cli_print_json(json_pack("{s:s, s:b, s:o, s:o}", "output", t->output, "dual", t->dual, "grid",
+                                    cli_json_grid(&t->input.grid), "white",
+                                    cli_json_numbers(t->input.white, t->input.grid.channels)));
+  }
+  if (!arguments->quiet) {
+    printf("%s: %s\n", t->output, t->dual ? "the projector's view, T' x" : "what the room looks like, b0 + T x");
+  }
+  return CLI_DONE;
+}
+
+static int run(const cli_command *command, const cli_arguments *arguments) {
+  task t = {0};
+  clt_error error = {0};
+  clt_status status = read_options(command, arguments, &t, &error);
+  if (!status) {
+    status = cli_input_open(arguments->positional[0], &t.input, &error);
+  }
+  if (!status) {
+    status = relight(&t, &error);
+  }
+  if (!status) {
+    status = write_result(command, arguments, &t, &error);
+  }
+  int code = status ? cli_fail(command, &error) : answer(arguments, &t);
+  clt_image_finish(&t.drive);
+  clt_image_finish(&t.seen);
+  cli_input_close(&t.input);
+  return code;
+}
+
+const cli_command cli_command_relight = {
+    .name = "relight",
+    .synopsis = "T.h5 --light PIC -o OUT [--dual]",
+    .summary = "light the measured room with a picture; --dual: the projector's view",
+    .options = options,
+    .positional_least = 1,
+    .positional_most = 1,
+    .run = run,
+    .notes = notes,
+};

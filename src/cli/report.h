@@ -1,0 +1,23 @@
+/* report.html of the demo: one page that holds everything it shows. */
+#ifndef CLT_CLI_REPORT_H
+#define CLT_CLI_REPORT_H
+
+#include <stddef.h>
+#include <stdio.h>
+
+#include "cli/demo.h"
+
+/* Writes the page; the pictures are read back from the demo's folder. */
+clt_status cli_report_write(const char *path, const demo *d, clt_error *error);
+
+/* An inline SVG of the relative residual (log) against the iteration, count >= 1 values. */
+void cli_report_curve(FILE *page, const double *residuals, size_t count);
+/* An inline SVG of the error maps' colour scale from 0 to top (in units of white). */
+clt_status cli_report_scale(FILE *page, double top, clt_error *error);
+
+/* Writes the file at path as a base64 data URI of an image/png. */
+clt_status cli_embed_png(FILE *page, const char *path, clt_error *error);
+/* Writes text with &, <, > and quotes escaped. */
+void cli_escape(FILE *page, const char *text);
+
+#endif

@@ -1,0 +1,123 @@
+/* counterlight simulate: a photograph of a scene under a drive. */
+#include <stdlib.h>
+
+#include "cli/answer.h"
+#include "cli/command.h"
+#include "cli/transport_input.h"
+#include "counterlight/station.h"
+
+static const cli_option options[] = {
+    {"drive", 'd', "PIC", "what the projector shows"},
+    {"output", 'o', "OUT", "where the picture goes (.png, .exr, .npy)"},
+    {"exact", 0, NULL, "the scene's noise-free radiance, without a camera"},
+    {NULL, 0, NULL, NULL},
+};
+
+static const char notes[] =
+    "Photographs the scene through its own simulated projector and camera, noise included, as the rig does it:\n"
+    "exposure bracket, black level and response curves undone, means over the grid's cells, b0 included.\n"
+    "--exact takes b0 + T x from the scene instead.\n"
+    "A .png or .jpg drive holds panel values and is decoded by the scene's projector response; .exr and .npy hold\n"
+    "linear light in 0..1. A .png result is divided by the scene's white (the median direct light of a fully driven\n"
+    "cell) and sRGB-encoded; .exr and .npy hold the radiance.\n";
+
+typedef struct task {
+  const char *drive_path, *output;
+  bool exact;
+  clt_station_config config;
+  clt_station station;
+  clt_rig_config rig;
+  double white[CLT_CHANNELS_MAX];
+  cli_grid grid;
+  clt_image drive, seen, deviation;
+} task;
+
+static clt_status read_options(const cli_command *command, const cli_arguments *arguments, task *t, clt_error *error) {
+  clt_status status = cli_required(command, arguments, "drive", &t->drive_path, error);
+  if (!status) {
+    status = cli_required(command, arguments, "output", &t->output, error);
+  }
+  t->exact = cli_value(command, arguments, "exact") != NULL;
+  return status ? status : cli_picture_output_check(t->output, error);
+}
+
+static clt_status open_scene(const char *path, task *t, clt_error *error) {
+  clt_status status = clt_station_for_scene(path, &t->config, error);
+  if (!status) {
+    status = clt_station_open(&t->config, &t->station, error);
+  }
+  if (status) {
+    return status;
+  }
+  clt_certificate *certificate = NULL;
+  const clt_transport *transport = clt_scene_transport(t->station.scene);
+  clt_transport_info info = clt_transport_describe(transport);
+  t->grid = (cli_grid){info.width, info.height, info.channels};
+  clt_scene_rig_config(t->station.scene, &t->rig);
+  status = clt_certify(transport, &certificate, error);
+  if (!status) {
+    cli_white(certificate, info.channels, t->white);
+  }
+  clt_certificate_destroy(certificate);
+  return status;
+}
+
+static clt_status photograph(task *t, clt_error *error) {
+  clt_status status = clt_station_open_rig(&t->config, &t->station, NULL, error);
+  if (!status) {
+    status = clt_image_init(&t->seen, t->grid.channels, t->grid.height, t->grid.width, error);
+  }
+  if (!status) {
+    status = clt_image_init(&t->deviation, t->grid.channels, t->grid.height, t->grid.width, error);
+  }
+  return status ? status
+                : t->station.rig->operations->observe(t->station.rig, &t->drive, &t->seen, &t->deviation, error);
+}
+
+static clt_status simulate(const char *path, task *t, clt_error *error) {
+  clt_status status = open_scene(path, t, error);
+  if (!status) {
+    status = cli_drive_read(t->drive_path, &t->rig.projector, &t->grid, &t->drive, error);
+  }
+  if (!status) {
+    status = t->exact ? clt_scene_appearance(t->station.scene, &t->drive, &t->seen, error) : photograph(t, error);
+  }
+  return status ? status : cli_radiance_write(t->output, &t->seen, t->white, error);
+}
+
+static int answer(const cli_arguments *arguments, const task *t) {
+  if (arguments->json) {
+    return cli_print_json(json_pack("{s:s, s:b, s:o, s:o}", "output", t->output, "exact", t->exact, "grid",
+                                    cli_json_grid(&t->grid), "white", cli_json_numbers(t->white, t->grid.channels)));
+  }
+  if (!arguments->quiet) {
+    printf("%s: %s\n", t->output, t->exact ? "the scene's exact radiance" : "the scene as its camera saw it");
+  }
+  return CLI_DONE;
+}
+
+static int run(const cli_command *command, const cli_arguments *arguments) {
+  task t = {0};
+  clt_error error = {0};
+  clt_status status = read_options(command, arguments, &t, &error);
+  if (!status) {
+    status = simulate(arguments->positional[0], &t, &error);
+  }
+  int code = status ? cli_fail(command, &error) : answer(arguments, &t);
+  clt_image_finish(&t.drive);
+  clt_image_finish(&t.seen);
+  clt_image_finish(&t.deviation);
+  clt_station_close(&t.station);
+  return code;
+}
+
+const cli_command cli_command_simulate = {
+    .name = "simulate",
+    .synopsis = "SCENE --drive PIC -o OUT [--exact]",
+    .summary = "photograph a simulated scene under a drive",
+    .options = options,
+    .positional_least = 1,
+    .positional_most = 1,
+    .run = run,
+    .notes = notes,
+};

@@ -1,0 +1,24 @@
+/* A transport file as an argument: loaded and certified. */
+#ifndef CLT_CLI_TRANSPORT_INPUT_H
+#define CLT_CLI_TRANSPORT_INPUT_H
+
+#include "cli/picture.h"
+#include "counterlight/solve.h"
+#include "counterlight/transport.h"
+
+typedef struct cli_input {
+  clt_transport *transport;
+  clt_certificate *certificate;
+  cli_grid grid;
+  clt_curve response;             /* of the projector it was measured with; sRGB where the file does not say */
+  double white[CLT_CHANNELS_MAX]; /* median F of each channel: the radiance that white means by default */
+} cli_input;
+
+/* Loads, certifies and describes; CLT_BAD_INPUT names file and field. On failure nothing needs to be closed. */
+clt_status cli_input_open(const char *path, cli_input *input, clt_error *error);
+void cli_input_close(cli_input *input);
+
+/* The white of every channel as the certificate has it; 1 where a channel has no lit cell. */
+void cli_white(const clt_certificate *certificate, int channels, double *white);
+
+#endif
