@@ -33,7 +33,7 @@ static const char head[] =
     "svg{display:block;width:100%;height:auto}svg text{fill:var(--soft);font-size:13px}svg .title{fill:var(--ink)}\n"
     "svg .power{font-size:10px}svg .grid{stroke:var(--line)}svg polyline{fill:none;stroke:var(--mark);"
     "stroke-width:2.2;stroke-linejoin:round}svg circle{fill:var(--mark)}\n"
-    ".scale{max-width:700px;margin:16px auto 0}.curve{max-width:760px}\n"
+    ".scale{max-width:700px;margin:16px auto 0}.curve{max-width:860px}\n"
     "dl{margin:0;max-width:52em}dt{font-weight:600;margin-top:.9em}dd{margin:0;color:var(--soft)}\n"
     "</style></head><body><main>\n";
 
@@ -57,7 +57,7 @@ static const char words[] =
 static void put_verdict(FILE *page, const demo *d) {
   fprintf(page,
           "<p class=\"lead\">Without compensation the picture is <b>%.1f&nbsp;%%</b> off; with it "
-          "<b>%.2g&nbsp;%%</b>, and no drive between 0 and 1 could do better than %.2g&nbsp;%%.</p>\n",
+          "<b>%.2f&nbsp;%%</b>, and no drive between 0 and 1 could do better than %.2f&nbsp;%%.</p>\n",
           100 * d->before.error, 100 * d->after.error, 100 * d->error_limit);
 }
 
@@ -95,19 +95,19 @@ static clt_status put_pictures(FILE *page, const demo *d, clt_error *error) {
   char before[160], after[160], pattern[160];
   snprintf(before, sizeof before, "%.1f&nbsp;%% off, at the brightness that suits it best (&times;&nbsp;%.2f)",
            100 * d->before.error, d->before.gain);
-  snprintf(after, sizeof after, "%.2g&nbsp;%% off, as photographed", 100 * d->after.error);
+  snprintf(after, sizeof after, "%.2f&nbsp;%% off, as photographed", 100 * d->after.error);
   snprintf(pattern, sizeof pattern, "panel values; %.0f&nbsp;%% of the cells are fully off or fully on",
            100 * d->result.clipped_fraction);
   fputs("<h2>What was asked, and what was seen</h2>\n<div class=\"pair\">\n", page);
   clt_status status = put_figure(page, d, "target.png", "Asked for", "the target", error);
   if (!status) {
+    status = put_figure(page, d, "pattern.png", "The pattern that makes it appear", pattern, error);
+  }
+  if (!status) {
     status = put_figure(page, d, "uncompensated.png", "Seen without compensation", before, error);
   }
   if (!status) {
     status = put_figure(page, d, "compensated.png", "Seen with compensation", after, error);
-  }
-  if (!status) {
-    status = put_figure(page, d, "pattern.png", "The pattern that does it", pattern, error);
   }
   fputs("</div>\n", page);
   return status;

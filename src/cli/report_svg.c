@@ -111,16 +111,17 @@ static clt_status draw_stops(FILE *page, clt_error *error) {
 }
 
 clt_status cli_report_scale(FILE *page, double top, clt_error *error) {
-  fputs("<svg class=\"scale\" viewBox=\"0 0 700 46\" role=\"img\" aria-label=\"colour scale of the error "
+  fputs("<svg class=\"scale\" viewBox=\"0 0 700 62\" role=\"img\" aria-label=\"colour scale of the error "
         "maps\"><defs><linearGradient id=\"scale\">",
         page);
   clt_status status = draw_stops(page, error);
   fputs("</linearGradient></defs><rect x=\"20\" y=\"2\" width=\"660\" height=\"16\" rx=\"3\" fill=\"url(#scale)\"/>\n",
         page);
   for (int i = 0; i <= 4; i++) {
-    fprintf(page, "<text x=\"%d\" y=\"38\" text-anchor=\"middle\">%.3g %%%s</text>", 20 + 165 * i, 25 * i * top,
-            i == 4 ? " of white" : "");
+    fprintf(page, "<text x=\"%d\" y=\"36\" text-anchor=\"middle\">%.3g&nbsp;%%</text>", 20 + 165 * i, 25 * i * top);
   }
+  fputs("<text x=\"350\" y=\"56\" text-anchor=\"middle\">difference from the target, as a share of white</text>\n",
+        page);
   fputs("</svg>\n", page);
   return status;
 }
