@@ -3,7 +3,6 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "base/clock.h"
@@ -11,17 +10,24 @@
 enum { BAR_CELLS = 28 };
 static const double redraw_s = 0.1;
 
-static void stopping_signals(sigset_t *set) {
-  sigemptyset(set);
-  sigaddset(set, SIGINT);
-  sigaddset(set, SIGTERM);
+static const int stopping_signals[] = {SIGINT, SIGTERM};
+enum { STOPPING_SIGNALS = sizeof stopping_signals / sizeof *stopping_signals };
+
+/* Does nothing: SA_RESETHAND makes the kernel itself remember that it was called. Blocking the signals would not do, as
+ * the threads of libraries that start them before main would still take them. */
+static void remember(int signal_number) {
+  (void)signal_number;
 }
 
 void cli_progress_begin(cli_progress *progress, bool quiet) {
-  sigset_t stopping;
-  stopping_signals(&stopping);
+  struct sigaction once = {.sa_handler = remember, .sa_flags = SA_RESETHAND | SA_RESTART};
   *progress = (cli_progress){.shown = !quiet && isatty(STDERR_FILENO)};
-  pthread_sigmask(SIG_BLOCK, &stopping, &progress->before);
+  for (int i = 0; i < STOPPING_SIGNALS; i++) {
+    sigaction(stopping_signals[i], NULL, &progress->before[i]);
+    if (progress->before[i].sa_handler != SIG_IGN) {
+      sigaction(stopping_signals[i], &once, NULL);
+    }
+  }
 }
 
 static void erase(cli_progress *progress) {
@@ -32,18 +38,20 @@ static void erase(cli_progress *progress) {
 }
 
 void cli_progress_end(cli_progress *progress) {
-  sigset_t stopping;
-  stopping_signals(&stopping);
   erase(progress);
-  if (cli_interrupted()) {
-    sigtimedwait(&stopping, NULL, &(struct timespec){0});
+  for (int i = 0; i < STOPPING_SIGNALS; i++) {
+    sigaction(stopping_signals[i], &progress->before[i], NULL);
   }
-  pthread_sigmask(SIG_SETMASK, &progress->before, NULL);
 }
 
 bool cli_interrupted(void) {
-  sigset_t pending;
-  return sigpending(&pending) == 0 && (sigismember(&pending, SIGINT) == 1 || sigismember(&pending, SIGTERM) == 1);
+  for (int i = 0; i < STOPPING_SIGNALS; i++) {
+    struct sigaction now;
+    if (sigaction(stopping_signals[i], NULL, &now) == 0 && now.sa_handler == SIG_DFL) {
+      return true;
+    }
+  }
+  return false;
 }
 
 clt_status cli_check_interrupt(clt_error *error) {

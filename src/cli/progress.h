@@ -9,16 +9,15 @@
 #include "counterlight/acquire.h"
 
 typedef struct cli_progress {
-  bool shown;       /* stderr is a terminal and the command is not quiet */
-  bool drawn;       /* a bar stands on the terminal's last line */
-  int64_t drawn_ns; /* when */
-  sigset_t before;  /* the signals that were blocked before */
+  bool shown;                 /* stderr is a terminal and the command is not quiet */
+  bool drawn;                 /* a bar stands on the terminal's last line */
+  int64_t drawn_ns;           /* when */
+  struct sigaction before[2]; /* what SIGINT and SIGTERM did before */
 } cli_progress;
 
-/* From here on SIGINT and SIGTERM wait until they are asked for (cli_interrupted). Called before anything starts a
- * thread, so that every thread inherits it. */
+/* From here on the first SIGINT or SIGTERM is only remembered (cli_interrupted); the second one kills. */
 void cli_progress_begin(cli_progress *progress, bool quiet);
-/* Takes the bar away and lets the signals through again; one that was already answered is dropped. */
+/* Takes the bar away and gives the signals back what they did before. */
 void cli_progress_end(cli_progress *progress);
 /* True where SIGINT or SIGTERM came since cli_progress_begin. */
 bool cli_interrupted(void);

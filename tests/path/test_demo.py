@@ -1,6 +1,7 @@
 """demo on a small room: every result is there, and numpy finds the numbers of the summary in the files."""
 import json
 import os
+import pathlib
 import re
 import signal
 import subprocess
@@ -172,12 +173,19 @@ class Steps(PathTest):
         off = relative_error(photograph, exact)
         self.assertTrue(1e-6 < off < 0.03, off)
 
+    def wait_until_it_listens(self, process):
+        """Until SIGINT has a handler (SigCgt in proc(5))."""
+        status = pathlib.Path(f"/proc/{process.pid}/status")
+        while int(re.search(r"SigCgt:\s*(\w+)", status.read_text())[1], 16) >> (signal.SIGINT - 1) & 1 == 0:
+            self.assertIsNone(process.poll())
+            time.sleep(0.02)
+
     def test_interrupt_ends_an_acquisition_with_nothing_written(self):
         scene = self.scene(48, 36, 3)
         for _ in range(3):
             process = subprocess.Popen([PROGRAM, "acquire", "--scene", scene, "--scheme", "brute", "-o",
                                         self.folder / "T.h5"], text=True, stderr=subprocess.PIPE)
-            time.sleep(0.5)
+            self.wait_until_it_listens(process)
             process.send_signal(signal.SIGINT)
             line = process.communicate(timeout=60)[1]
             self.assertEqual(process.returncode, 1, line)
