@@ -102,15 +102,9 @@ static const struct {
   const char *name;
   clt_status (*write)(const char *path, const demo *d, clt_error *error);
 } results[] = {
-    {"target.png", write_target},
-    {"uncompensated.png", write_uncompensated},
-    {"compensated.png", write_compensated},
-    {"pattern.png", write_pattern},
-    {"error-before.png", write_error_before},
-    {"error-after.png", write_error_after},
-    {"transport.h5", write_transport},
-    {"summary.json", write_summary},
-    {"report.html", cli_report_write},
+    {"transport.h5", write_transport},      {"target.png", write_target},    {"uncompensated.png", write_uncompensated},
+    {"compensated.png", write_compensated}, {"pattern.png", write_pattern},  {"error-before.png", write_error_before},
+    {"error-after.png", write_error_after}, {"summary.json", write_summary}, {"report.html", cli_report_write},
 };
 
 clt_status demo_write(const demo *d, clt_error *error) {
