@@ -21,8 +21,8 @@ typedef struct clt_progress {
 typedef struct clt_acquire_options {
   const char *scheme; /* "brute", "hierarchical" or "auto" (NULL: auto) */
   double threshold;   /* hierarchical: tau, the fraction of a cell's light under the flood below which the light of a
-                         block that cannot be predicted is not resolved further; 0..0.5, 0 means 0.002 */
-  int repeats;        /* observations averaged for black and flood, 1..256; 0 means 8 */
+                         block that cannot be predicted is not resolved further; 0..0.5, 0 means 0.005 */
+  int repeats;        /* observations averaged for black and flood, 1..256; 0 means 8, with "brute" N / 32 if more */
   int checks;         /* random check patterns observed at the end for provenance.error, 0..64 */
   unsigned seed;      /* of the check patterns */
   /* Called after every pattern; returning false cancels (CLT_CANCELLED). May be NULL. */

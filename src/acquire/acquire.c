@@ -10,9 +10,9 @@
 #include "base/clock.h"
 #include "base/memory.h"
 
-#define THRESHOLD_DEFAULT 0.002
+#define THRESHOLD_DEFAULT 0.005
 #define THRESHOLD_MAX 0.5
-enum { REPEATS_DEFAULT = 8, REPEATS_MAX = 256, CHECKS_MAX = 64 };
+enum { CHECKS_MAX = 64 };
 /* Up to here one photograph per cell is as quick as anything cleverer. */
 enum { BRUTE_CELLS_MAX = 64 };
 
@@ -24,15 +24,14 @@ static clt_status check_options(const clt_acquire_options *options, clt_acquire_
   if (!(options->threshold >= 0 && options->threshold <= THRESHOLD_MAX)) {
     return clt_fail(error, CLT_BAD_INPUT, "threshold is %g; legal is 0 to %g", options->threshold, THRESHOLD_MAX);
   }
-  if (options->repeats < 0 || options->repeats > REPEATS_MAX) {
+  if (options->repeats < 0 || options->repeats > CLT_REPEATS_MAX) {
     return clt_fail(error, CLT_BAD_INPUT, "repeats is %d; legal is 0 (the default) to %d", options->repeats,
-                    REPEATS_MAX);
+                    CLT_REPEATS_MAX);
   }
   if (options->checks < 0 || options->checks > CHECKS_MAX) {
     return clt_fail(error, CLT_BAD_INPUT, "checks is %d; legal is 0 to %d", options->checks, CHECKS_MAX);
   }
   checked->threshold = options->threshold > 0 ? options->threshold : THRESHOLD_DEFAULT;
-  checked->repeats = options->repeats > 0 ? options->repeats : REPEATS_DEFAULT;
   return CLT_OK;
 }
 
@@ -185,6 +184,7 @@ clt_status clt_acquire(clt_rig *rig, const clt_acquire_options *options, clt_tra
     status = find_scheme(checked.scheme, session.cells, &scheme, error);
   }
   if (status == CLT_OK) {
+    session.options.repeats = checked.repeats > 0 ? checked.repeats : scheme->repeats(session.cells);
     status = acquire(&session, scheme, out, error);
   }
   clt_session_finish(&session);

@@ -310,10 +310,15 @@ static clt_status measure_hierarchical(clt_session *session, clt_transport **out
   return CLT_OK;
 }
 
+static int repeats_by_default(size_t cells) {
+  (void)cells;
+  return CLT_REPEATS_DEFAULT;
+}
+
 /* A guess until the first level is coloured. */
 static long guess_patterns(const clt_session *session) {
   clt_pyramid pyramid = clt_pyramid_of(session->info.width, session->info.height);
   return 40L * (pyramid.levels - 1);
 }
 
-const clt_scheme clt_scheme_hierarchical = {"hierarchical", guess_patterns, measure_hierarchical};
+const clt_scheme clt_scheme_hierarchical = {"hierarchical", repeats_by_default, guess_patterns, measure_hierarchical};

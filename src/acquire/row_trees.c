@@ -11,6 +11,7 @@
 /* Light that is shared evenly at one level may still be uneven below, by chance or by symmetry: a spread is at least
  * this part of a block's light. */
 #define SPREAD_FLOOR (1.0f / 16)
+enum { WORTH_SHARING = 65536 }; /* leaves from which threads pay */
 
 static clt_status allocate_leaves(clt_row_trees *trees, clt_error *error) {
   size_t leaves = (size_t)trees->start[trees->rows];
@@ -139,7 +140,7 @@ clt_status clt_row_trees_split(const clt_row_trees *before, const clt_pyramid *p
   if (status != CLT_OK) {
     return status;
   }
-#pragma omp parallel for schedule(dynamic, 256)
+#pragma omp parallel for schedule(dynamic, 256) if (after->start[after->rows] >= WORTH_SHARING)
   for (size_t i = 0; i < before->rows; i++) {
     int64_t to = after->start[i];
     for (int64_t e = before->start[i]; e < before->start[i + 1]; e++) {
@@ -175,7 +176,7 @@ static double explain(const clt_row_trees *trees, size_t i, int32_t children_end
 void clt_row_trees_correct(clt_row_trees *trees, const clt_pyramid *pyramid, int level, const double *fill,
                            const clt_image *seen, const double *scale, const float *noise) {
   int32_t children_end = pyramid->first[level + 1];
-#pragma omp parallel for schedule(dynamic, 256)
+#pragma omp parallel for schedule(dynamic, 256) if (trees->start[trees->rows] >= WORTH_SHARING)
   for (size_t i = 0; i < trees->rows; i++) {
     double residual[4] = {0};
     double total = explain(trees, i, children_end, fill, residual) + noise[i];
@@ -241,6 +242,38 @@ static float unevenness(const clt_row_trees *before, int64_t parent, const clt_r
   return (float)sqrt(largest);
 }
 
+/* The last child of four was not photographed: all that is known is that its family adds up to the parent. Where one
+ * sibling holds the cell's own light, the difference of two bright measurements says less than the two dim siblings do:
+ * the light is expected to be like theirs, unless more is missing than noise explains. */
+static void expect_last_child(clt_row_trees *trees, int64_t first, const double *total, double total_variance) {
+  int channels = trees->channels;
+  int64_t last = first + 3, brightest = first;
+  double noise = total_variance;
+  for (int64_t e = first; e < last; e++) {
+    brightest = largest_value(trees, e) > largest_value(trees, brightest) ? e : brightest;
+    noise += trees->variance[e];
+  }
+  double mean[4] = {0}, missing[4], dim = 0, largest = 0;
+  memcpy(missing, total, (size_t)channels * sizeof *missing);
+  for (int64_t e = first; e < last; e++) {
+    for (int c = 0; c < channels; c++) {
+      double value = trees->value[e * channels + c];
+      missing[c] -= value;
+      mean[c] += e == brightest ? 0 : value / 2;
+    }
+    dim = e == brightest ? dim : fmax(dim, pow(largest_value(trees, e), 2) + trees->variance[e]);
+  }
+  for (int c = 0; c < channels; c++) {
+    largest = fmax(largest, fabs(missing[c] - mean[c]));
+  }
+  if (largest * largest < NOISE_FLOOR * NOISE_FLOOR * (noise + dim) && dim < trees->variance[last]) {
+    trees->variance[last] = (float)dim;
+    for (int c = 0; c < channels; c++) {
+      trees->value[last * channels + c] = (float)mean[c];
+    }
+  }
+}
+
 static void settle_row(clt_row_trees *after, const clt_row_trees *before, const clt_pyramid *pyramid, int level,
                        size_t i) {
   int64_t e = after->start[i];
@@ -255,6 +288,9 @@ static void settle_row(clt_row_trees *after, const clt_row_trees *before, const 
     for (int c = 0; c < before->channels; c++) {
       total[c] = before->value[parent * before->channels + c];
     }
+    if (count == 4) {
+      expect_last_child(after, e, total, before->variance[parent]);
+    }
     share_missing(after, e, count, total, before->variance[parent]);
     float spread = unevenness(before, parent, after, e, count, pyramid, level);
     for (int q = 0; q < count; q++, e++) {
@@ -265,7 +301,7 @@ static void settle_row(clt_row_trees *after, const clt_row_trees *before, const 
 }
 
 void clt_row_trees_settle(clt_row_trees *after, const clt_row_trees *before, const clt_pyramid *pyramid, int level) {
-#pragma omp parallel for schedule(dynamic, 256)
+#pragma omp parallel for schedule(dynamic, 256) if (after->start[after->rows] >= WORTH_SHARING)
   for (size_t i = 0; i < after->rows; i++) {
     settle_row(after, before, pyramid, level, i);
   }
@@ -273,7 +309,7 @@ void clt_row_trees_settle(clt_row_trees *after, const clt_row_trees *before, con
 
 void clt_row_trees_match_flood(clt_row_trees *trees, const clt_image *flood, const double *scale,
                                const float *variance) {
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (trees->start[trees->rows] >= WORTH_SHARING)
   for (size_t i = 0; i < trees->rows; i++) {
     double total[4];
     for (int c = 0; c < trees->channels; c++) {

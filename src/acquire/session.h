@@ -20,10 +20,12 @@ typedef struct clt_session {
 /* A way to measure T. */
 typedef struct clt_scheme {
   const char *name;
+  int (*repeats)(size_t cells);                 /* of black and flood where the options leave it open */
   long (*patterns)(const clt_session *session); /* expected number, without black, flood and checks */
   /* Measures a transport with black and flood already in the session; rows sum to the flood; sigma is kept. */
   clt_status (*measure)(clt_session *session, clt_transport **out, clt_error *error);
 } clt_scheme;
+enum { CLT_REPEATS_DEFAULT = 8, CLT_REPEATS_MAX = 256 };
 extern const clt_scheme clt_scheme_brute, clt_scheme_hierarchical;
 
 clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquire_options *options, clt_error *error);

@@ -11,6 +11,7 @@
  * comes near, and the limit of a single sample then only meets hot pixels. */
 #define SAMPLE_LIMIT 0.98
 #define MEAN_LIMIT 0.95
+enum { WORTH_SHARING = 32768 }; /* values from which threads pay */
 
 static void fill_tables(clt_merge *merge, const clt_curve *response) {
   int top = (1 << merge->camera.bits) - 1;
@@ -76,7 +77,7 @@ void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame) {
   int channels = merge->camera.channels;
   clt_merge_sum *sums = merge->sums + (size_t)exposure * (size_t)channels * footprints->cells;
   merge->seconds[exposure] = frame->exposure_s;
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (footprints->cells >= WORTH_SHARING)
   for (size_t i = 0; i < footprints->cells; i++) {
     int64_t first = footprints->start[i], count = footprints->start[i + 1] - first;
     for (int c = 0; c < channels; c++) {
@@ -132,7 +133,7 @@ static double merge_rate(const clt_merge *merge, const clt_merge_sum *sums, size
 void clt_merge_radiance(const clt_merge *merge, clt_image *radiance, clt_image *deviation) {
   size_t cells = merge->footprints->cells, values = cells * (size_t)merge->camera.channels;
   double responsivity = merge->camera.responsivity;
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (values >= WORTH_SHARING)
   for (size_t i = 0; i < values; i++) {
     bool seen = merge->footprints->start[i % cells + 1] > merge->footprints->start[i % cells];
     double variance = INFINITY;
