@@ -15,9 +15,17 @@ typedef struct demo_timings {
   double scene, acquire, certify, photograph, reference, total;
 } demo_timings;
 
+/* One method's way to the unbounded or bounded solution of the same target. */
+enum { DEMO_RACE_MAX = 8 };
+typedef struct demo_race {
+  int count;
+  clt_solve_result runs[DEMO_RACE_MAX];
+} demo_race;
+
 /* One drive as it looked to the rig. */
+enum { DEMO_OBSERVATIONS = 8 };
 typedef struct demo_sight {
-  clt_image radiance;  /* the photograph */
+  clt_image radiance;  /* the photograph, the mean of DEMO_OBSERVATIONS */
   double gain;         /* brightness factor that the error and the pictures are taken with */
   double error;        /* ||gain * radiance - target|| / ||target|| over lit cells */
   double exact_error;  /* the same for the scene's own noise-free radiance */
@@ -41,6 +49,7 @@ typedef struct demo {
   clt_image drive;
   clt_compensation result; /* as predicted by the acquired transport */
   demo_sight before, after;
+  demo_race race;     /* every method that serves here, for the report's curves */
   double error_limit; /* on the scene's exact transport */
   double map_top;     /* the top of the error maps' colour scale, in units of white */
   demo_timings timings;
@@ -51,6 +60,9 @@ typedef struct demo {
 clt_status demo_run(demo *d, clt_error *error);
 /* Frees all of it; accepts one that stopped half way. */
 void demo_finish(demo *d);
+
+/* Solves once more with every method that takes this transport. */
+clt_status demo_race_methods(demo *d, clt_error *error);
 
 /* What summary.json and --json hold. */
 json_t *demo_summary(const demo *d);

@@ -29,6 +29,7 @@ json_t *demo_summary(const demo *d) {
   json_object_set_new(summary, "error_limit", cli_json_number(d->error_limit));
   json_object_set_new(summary, "error_exact_before", cli_json_number(d->before.exact_error));
   json_object_set_new(summary, "error_exact_after", cli_json_number(d->after.exact_error));
+  json_object_set_new(summary, "observations", json_integer(DEMO_OBSERVATIONS));
   json_object_set_new(summary, "gain_before", cli_json_number(d->before.gain));
   json_object_set_new(summary, "acquire_error", origin->error < 0 ? json_null() : cli_json_number(origin->error));
   json_object_set_new(summary, "device_s", cli_json_number(origin->seconds));

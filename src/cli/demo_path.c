@@ -86,17 +86,34 @@ static clt_status draw_error_map(const demo *d, demo_sight *sight, clt_error *er
   return CLT_OK;
 }
 
-/* Projects a drive and photographs it through the rig. fit_gain: judged at its best brightness. */
-static clt_status photograph(demo *d, const clt_image *drive, bool fit_gain, demo_sight *sight, clt_error *error) {
-  clt_image deviation = {0}, exact = {0};
+/* The mean of several observations: noise of the photograph is no error of the compensation. */
+static clt_status observe_mean(const demo *d, const clt_image *drive, clt_image *mean, clt_error *error) {
   const cli_grid *g = &d->grid;
-  clt_status status = clt_image_init(&sight->radiance, g->channels, g->height, g->width, error);
+  clt_image seen = {0}, deviation = {0};
+  clt_status status = clt_image_init(mean, g->channels, g->height, g->width, error);
+  if (!status) {
+    status = clt_image_init(&seen, g->channels, g->height, g->width, error);
+  }
   if (!status) {
     status = clt_image_init(&deviation, g->channels, g->height, g->width, error);
   }
-  if (!status) {
-    status = d->station.rig->operations->observe(d->station.rig, drive, &sight->radiance, &deviation, error);
+  size_t count = clt_image_size(mean);
+  for (int k = 0; !status && k < DEMO_OBSERVATIONS; k++) {
+    status = d->station.rig->operations->observe(d->station.rig, drive, &seen, &deviation, error);
+    for (size_t i = 0; !status && i < count; i++) {
+      mean->data[i] += seen.data[i] / DEMO_OBSERVATIONS;
+    }
   }
+  clt_image_finish(&seen);
+  clt_image_finish(&deviation);
+  return status;
+}
+
+/* Projects a drive and photographs it through the rig. fit_gain: judged at its best brightness. */
+static clt_status photograph(const demo *d, const clt_image *drive, bool fit_gain, demo_sight *sight,
+                             clt_error *error) {
+  clt_image exact = {0};
+  clt_status status = observe_mean(d, drive, &sight->radiance, error);
   if (!status) {
     status = clt_scene_appearance(d->station.scene, drive, &exact, error);
   }
@@ -106,7 +123,6 @@ static clt_status photograph(demo *d, const clt_image *drive, bool fit_gain, dem
     sight->exact_error = clt_appearance_error(d->certificate, &exact, &d->target, fit_gain);
     status = draw_error_map(d, sight, error);
   }
-  clt_image_finish(&deviation);
   clt_image_finish(&exact);
   return status;
 }
@@ -177,8 +193,8 @@ static clt_status choose_map_top(demo *d, clt_error *error) {
 }
 
 clt_status demo_run(demo *d, clt_error *error) {
-  static clt_status (*const steps[])(demo *, clt_error *) = {open_station,    load_picture, measure,       solve,
-                                                             photograph_both, find_limit,   choose_map_top};
+  static clt_status (*const steps[])(demo *, clt_error *) = {
+      open_station, load_picture, measure, solve, photograph_both, find_limit, choose_map_top, demo_race_methods};
   int64_t start = clt_clock_ns();
   clt_status status = CLT_OK;
   for (size_t i = 0; !status && i < sizeof steps / sizeof *steps; i++) {

@@ -31,8 +31,10 @@ static const char head[] =
     "vertical-align:top}\n"
     "td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}\n"
     "svg{display:block;width:100%;height:auto}svg text{fill:var(--soft);font-size:13px}svg .title{fill:var(--ink)}\n"
-    "svg .power{font-size:10px}svg .grid{stroke:var(--line)}svg polyline{fill:none;stroke:var(--mark);"
-    "stroke-width:2.2;stroke-linejoin:round}svg circle{fill:var(--mark)}\n"
+    "svg .power{font-size:10px}svg .grid{stroke:var(--line)}svg polyline{fill:none;stroke-width:2.2;"
+    "stroke-linejoin:round}.run polyline{stroke:var(--run)}.run circle{fill:var(--run)}\n"
+    ".r0{--run:#7c8798}.r1{--run:#2a9d8f}.r2{--run:#3b82f6}.r3{--run:var(--mark)}"
+    ".r2 polyline{stroke-dasharray:7 5}\n"
     ".scale{max-width:700px;margin:16px auto 0}.curve{max-width:860px}\n"
     "dl{margin:0;max-width:52em}dt{font-weight:600;margin-top:.9em}dd{margin:0;color:var(--soft)}\n"
     "</style></head><body><main>\n";
@@ -51,8 +53,8 @@ static const char words[] =
     "that much.</dd>\n"
     "<dt>White</dt><dd>The radiance that the picture's white stands for: by default what a fully driven cell of this "
     "room shows of its own light.</dd>\n"
-    "<dt>Residual</dt><dd>How far the solver still was from its equations after each iteration, relative to the "
-    "start.</dd>\n</dl>\n";
+    "<dt>Residual</dt><dd>How far a solver still is from its equations after an iteration, relative to the "
+    "light that is wanted.</dd>\n</dl>\n";
 
 static void put_verdict(FILE *page, const demo *d) {
   fprintf(page,
@@ -69,7 +71,8 @@ static void put_opening(FILE *page, const demo *d) {
       "<p class=\"soft\">Light from a projector bounces between the surfaces of a room: corners glow, walls bleed into "
       "each other, blacks turn grey. counterlight measured how this room (<code>",
       page);
-  cli_escape(page, d->scene);
+  const char *slash = strrchr(d->scene, '/');
+  cli_escape(page, slash ? slash + 1 : d->scene);
   fprintf(page,
           "</code>, simulated, %d&nbsp;&times;&nbsp;%d cells) carries light with %d patterns and %d camera frames, "
           "inverted that, and projected the pattern below.</p>\n",
@@ -95,7 +98,8 @@ static clt_status put_pictures(FILE *page, const demo *d, clt_error *error) {
   char before[160], after[160], pattern[160];
   snprintf(before, sizeof before, "%.1f&nbsp;%% off, at the brightness that suits it best (&times;&nbsp;%.2f)",
            100 * d->before.error, d->before.gain);
-  snprintf(after, sizeof after, "%.2f&nbsp;%% off, as photographed", 100 * d->after.error);
+  snprintf(after, sizeof after, "%.2f&nbsp;%% off, as photographed (mean of %d)", 100 * d->after.error,
+           DEMO_OBSERVATIONS);
   snprintf(pattern, sizeof pattern, "panel values; %.0f&nbsp;%% of the cells are fully off or fully on",
            100 * d->result.clipped_fraction);
   fputs("<h2>What was asked, and what was seen</h2>\n<div class=\"pair\">\n", page);
@@ -128,11 +132,17 @@ static void put_convergence(FILE *page, const demo *d) {
   const clt_solve_result *solve = &d->result.solve;
   fputs("<h2>How the solver got there</h2>\n<p>", page);
   cli_escape(page, solve->method);
-  fprintf(page, ", %d iterations in %.3g&nbsp;ms: ", solve->iterations, 1e3 * solve->seconds);
+  fprintf(page, ", %d iterations in %.0f&nbsp;ms: ", solve->iterations, 1e3 * solve->seconds);
   cli_escape(page, solve->reason);
-  fputs("</p>\n", page);
-  if (solve->curve_count > 0) {
-    cli_report_curve(page, solve->curve, solve->curve_count);
+  fputs(".</p>\n", page);
+  if (d->race.count > 0) {
+    fputs(
+        "<p class=\"soft\">Every method that takes this transport, on the same target. The bounded one starts from a "
+        "linear "
+        "solution and ends at the limit, as it may not ask for less than no light; the others go below it with drives "
+        "that no projector can show.</p>\n",
+        page);
+    cli_report_curves(page, d->race.runs, d->race.count);
   }
 }
 

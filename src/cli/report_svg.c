@@ -19,13 +19,17 @@ static double at_y(const axes *a, double value) {
   return a->top + a->height * fmin(fmax(share, 0), 1);
 }
 
-static void choose_decades(axes *a, const double *residuals, size_t count) {
+static void choose_axes(axes *a, const clt_solve_result *runs, int count) {
   double low = INFINITY, high = 0;
-  for (size_t i = 0; i < count; i++) {
-    if (isfinite(residuals[i]) && residuals[i] > 0) {
-      low = fmin(low, residuals[i]);
-      high = fmax(high, residuals[i]);
+  for (int k = 0; k < count; k++) {
+    for (size_t i = 0; i < runs[k].curve_count; i++) {
+      double residual = runs[k].curve[i];
+      if (isfinite(residual) && residual > 0) {
+        low = fmin(low, residual);
+        high = fmax(high, residual);
+      }
     }
+    a->last = runs[k].curve_count > a->last + 1 ? runs[k].curve_count - 1 : a->last;
   }
   a->decade_high = high > 0 ? (int)ceil(log10(high)) : 0;
   a->decade_low = high > 0 ? (int)floor(log10(low)) : -1;
@@ -64,22 +68,31 @@ static void draw_iterations(FILE *page, const axes *a) {
           a->top + a->height / 2);
 }
 
-void cli_report_curve(FILE *page, const double *residuals, size_t count) {
-  axes a = {.left = 74, .top = 14, .width = 606, .height = 230, .last = count > 1 ? count - 1 : 1};
-  choose_decades(&a, residuals, count);
-  fputs("<svg class=\"curve\" viewBox=\"0 0 700 300\" role=\"img\" aria-label=\"relative residual against the "
+static void draw_run(FILE *page, const axes *a, const clt_solve_result *run, int index) {
+  fprintf(page, "<g class=\"run r%d\"><polyline points=\"", index % 4);
+  for (size_t i = 0; i < run->curve_count; i++) {
+    fprintf(page, "%.1f,%.1f ", at_x(a, (double)i), at_y(a, run->curve[i]));
+  }
+  fputs("\"/>\n", page);
+  for (size_t i = 0; i < run->curve_count; i++) {
+    fprintf(page, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"2.8\"><title>%s, iteration %zu: %.3g</title></circle>",
+            at_x(a, (double)i), at_y(a, run->curve[i]), run->method, i, run->curve[i]);
+  }
+  double y = a->top + 14 + 22 * index, x = a->left + a->width + 24;
+  fprintf(page, "\n<polyline points=\"%.1f,%.1f %.1f,%.1f\"/><text x=\"%.1f\" y=\"%.1f\">%s</text></g>\n", x, y - 4,
+          x + 26, y - 4, x + 34, y, run->method);
+}
+
+void cli_report_curves(FILE *page, const clt_solve_result *runs, int count) {
+  axes a = {.left = 74, .top = 14, .width = 540, .height = 230, .last = 1};
+  choose_axes(&a, runs, count);
+  fputs("<svg class=\"curve\" viewBox=\"0 0 760 300\" role=\"img\" aria-label=\"relative residual against the "
         "iteration\">\n",
         page);
   draw_decades(page, &a);
   draw_iterations(page, &a);
-  fputs("<polyline points=\"", page);
-  for (size_t i = 0; i < count; i++) {
-    fprintf(page, "%.1f,%.1f ", at_x(&a, (double)i), at_y(&a, residuals[i]));
-  }
-  fputs("\"/>\n", page);
-  for (size_t i = 0; count <= 60 && i < count; i++) {
-    fprintf(page, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3.2\"><title>iteration %zu: %.3g</title></circle>",
-            at_x(&a, (double)i), at_y(&a, residuals[i]), i, residuals[i]);
+  for (int k = 0; k < count; k++) {
+    draw_run(page, &a, &runs[k], k);
   }
   fputs("</svg>\n", page);
 }
@@ -115,10 +128,10 @@ clt_status cli_report_scale(FILE *page, double top, clt_error *error) {
         "maps\"><defs><linearGradient id=\"scale\">",
         page);
   clt_status status = draw_stops(page, error);
-  fputs("</linearGradient></defs><rect x=\"20\" y=\"2\" width=\"660\" height=\"16\" rx=\"3\" fill=\"url(#scale)\"/>\n",
+  fputs("</linearGradient></defs><rect x=\"30\" y=\"2\" width=\"640\" height=\"16\" rx=\"3\" fill=\"url(#scale)\"/>\n",
         page);
   for (int i = 0; i <= 4; i++) {
-    fprintf(page, "<text x=\"%d\" y=\"36\" text-anchor=\"middle\">%.3g&nbsp;%%</text>", 20 + 165 * i, 25 * i * top);
+    fprintf(page, "<text x=\"%d\" y=\"36\" text-anchor=\"middle\">%.3g&nbsp;%%</text>", 30 + 160 * i, 25 * i * top);
   }
   fputs("<text x=\"350\" y=\"56\" text-anchor=\"middle\">difference from the target, as a share of white</text>\n",
         page);

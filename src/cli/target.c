@@ -31,7 +31,7 @@ static double inside(double distance, double radius, double edge) {
 }
 
 static colour sky(point p) {
-  static const colour zenith = {0.02, 0.04, 0.22}, violet = {0.26, 0.07, 0.36}, rim = {1.0, 0.34, 0.10};
+  static const colour zenith = {0.05, 0.07, 0.26}, violet = {0.27, 0.10, 0.36}, rim = {0.95, 0.36, 0.14};
   double t = p.y / horizon;
   colour c = t < 0.55 ? mix(zenith, violet, t / 0.55) : mix(violet, rim, (t - 0.55) / 0.45);
   double away = hypot(p.x - sun.x, p.y - sun.y);
@@ -40,8 +40,8 @@ static colour sky(point p) {
 }
 
 static colour sea(point p) {
-  static const colour stripes[] = {{0.02, 0.46, 0.52}, {0.62, 0.05, 0.20}, {0.03, 0.16, 0.60}, {0.80, 0.30, 0.02}};
-  static const colour deep = {0.005, 0.035, 0.10};
+  static const colour stripes[] = {{0.06, 0.46, 0.52}, {0.62, 0.09, 0.22}, {0.07, 0.18, 0.60}, {0.78, 0.32, 0.08}};
+  static const colour deep = {0.05, 0.09, 0.17};
   double depth = (p.y - horizon) / (1 - horizon);
   double wave = depth + 0.02 * sin(9 * p.x + 4 * depth);
   double band = 6 * sqrt(wave > 0 ? wave : 0);
@@ -66,7 +66,7 @@ static double segment_distance(point p, point a, point b) {
 /* A lighthouse on the hill, striped, with a lamp. */
 static colour lighthouse(point p, colour behind) {
   static const point foot = {0.46, 0.62}, top = {0.46, 0.26}, lamp = {0.46, 0.19};
-  static const colour wall = {0.82, 0.80, 0.78}, red = {0.72, 0.02, 0.03}, roof = {0.01, 0.01, 0.015};
+  static const colour wall = {0.82, 0.80, 0.78}, red = {0.72, 0.07, 0.08}, roof = {0.05, 0.05, 0.07};
   colour c = add(behind, lamp_light, 0.35 * exp(-pow(hypot(p.x - lamp.x, p.y - lamp.y) / 0.10, 2)));
   double width = 0.045 + 0.03 * (p.y - top.y) / (foot.y - top.y);
   double stripe = fmod((p.y - top.y) / 0.12, 1);
@@ -76,7 +76,7 @@ static colour lighthouse(point p, colour behind) {
 }
 
 static colour shade(point p) {
-  static const colour rock = {0.012, 0.010, 0.022};
+  static const colour rock = {0.050, 0.044, 0.075};
   colour c = p.y < horizon ? sky(p) : sea(p);
   c = lighthouse(p, c);
   return mix(c, rock, inside(hill_top(p.x) - p.y, 0, 0.02));
