@@ -307,6 +307,13 @@ void clt_row_trees_settle(clt_row_trees *after, const clt_row_trees *before, con
   }
 }
 
+/* Light is not negative: what noise put below zero is put at zero, the nearest value that can be. */
+static void drop_negative(clt_row_trees *trees, size_t i) {
+  for (int64_t at = trees->start[i] * trees->channels; at < trees->start[i + 1] * trees->channels; at++) {
+    trees->value[at] = fmaxf(trees->value[at], 0);
+  }
+}
+
 void clt_row_trees_match_flood(clt_row_trees *trees, const clt_image *flood, const double *scale,
                                const float *variance) {
 #pragma omp parallel for schedule(static) if (trees->start[trees->rows] >= WORTH_SHARING)
@@ -315,6 +322,7 @@ void clt_row_trees_match_flood(clt_row_trees *trees, const clt_image *flood, con
     for (int c = 0; c < trees->channels; c++) {
       total[c] = flood->data[(size_t)c * trees->rows + i] / scale[c];
     }
+    drop_negative(trees, i);
     if (isfinite(variance[i])) {
       share_missing(trees, trees->start[i], trees->start[i + 1] - trees->start[i], total, 0);
     }

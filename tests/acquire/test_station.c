@@ -159,6 +159,18 @@ static double prediction_error(const clt_transport *transport, const clt_scene *
   return sqrt(wrong / whole);
 }
 
+/* What was acquired must pass as a transport file, where light cannot be negative beyond noise. */
+static void assert_can_be_stored(const clt_transport *transport) {
+  char path[128];
+  clt_error error = {0};
+  clt_transport *loaded = NULL;
+  snprintf(path, sizeof path, "%s/T.h5", folder);
+  assert_ok(clt_transport_save(transport, path, &error), error);
+  assert_ok(clt_transport_load(path, &loaded, &error), error);
+  clt_transport_destroy(loaded);
+  unlink(path);
+}
+
 static void noisy_frames_give_the_scenes_transport(void **state) {
   (void)state;
   static const struct {
@@ -179,6 +191,7 @@ static void noisy_frames_give_the_scenes_transport(void **state) {
     assert_true(wrong < 0.004);
     assert_true(clt_transport_origin(transport)->patterns < cases[n].most);
     assert_true(clt_transport_origin(transport)->error < 0.01);
+    assert_can_be_stored(transport);
     clt_transport_destroy(transport);
     clt_station_close(&station);
   }
