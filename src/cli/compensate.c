@@ -23,8 +23,8 @@ static const char notes[] =
     "(sRGB where it names none); .exr and .npy hold linear light.\n"
     "--predict writes b0 + T x: divided by white and sRGB-encoded as .png or .jpg, so that it compares\n"
     "with the picture by eye; the radiance itself as .exr or .npy.\n"
-    "Errors are relative RMS over the lit cells in linear light; error_limit is the least that any drive\n"
-    "in 0..1 can reach.\n";
+    "Errors are relative RMS over the lit cells in linear light; error_after is that of the drive as written\n"
+    "(a .png rounds it to 8 bits), error_limit the least that any drive in 0..1 can reach.\n";
 
 typedef struct task {
   const char *target, *output, *predict;
@@ -59,14 +59,33 @@ static clt_status solve(const char *transport, task *t, clt_error *error) {
     status = clt_compensate(t->input.transport, t->input.certificate, &t->picture, &t->white, &t->solve, true,
                             &t->drive, &t->result, error);
   }
-  if (!status && t->predict) {
+  return status;
+}
+
+/* Judges the drive as it was written: a .png rounds it to 8 bits, a .jpg does worse. */
+static clt_status judge_written(task *t, clt_error *error) {
+  double white[CLT_CHANNELS_MAX];
+  clt_image target = {0};
+  clt_image_finish(&t->drive);
+  clt_status status = cli_picture_read(t->output, &t->input.response, &t->input.grid, &t->drive, error);
+  if (!status) {
     status = clt_predict(t->input.transport, &t->drive, &t->seen, error);
   }
+  if (!status) {
+    status = clt_target(t->input.transport, t->input.certificate, &t->picture, &t->white, &target, white, error);
+  }
+  if (!status) {
+    t->result.error_after = clt_appearance_error(t->input.certificate, &t->seen, &target, false);
+  }
+  clt_image_finish(&target);
   return status;
 }
 
 static clt_status write_pictures(task *t, clt_error *error) {
   clt_status status = clt_image_write(t->output, &t->input.response, &t->drive, error);
+  if (!status) {
+    status = judge_written(t, error);
+  }
   if (!status && t->predict) {
     status = cli_radiance_write(t->predict, &t->seen, t->result.white, error);
   }

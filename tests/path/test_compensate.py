@@ -70,8 +70,8 @@ class Compensate(PathTest):
         linear = np.load(self.folder / "drive.npy")
         np.testing.assert_allclose(codes, encode_srgb(linear), atol=0.5 / 255 + 1e-6)
         seen = appearance(self.dense, self.black, decode_srgb(codes))
-        self.assertAlmostEqual(relative_error(seen, self.wanted), answer["error_after"], delta=2e-3)
-        self.assertAlmostEqual(exact["error_after"], answer["error_after"], delta=1e-9)
+        self.assertAlmostEqual(relative_error(seen, self.wanted), answer["error_after"], delta=1e-4)
+        self.assertTrue(exact["error_after"] < answer["error_after"] < 0.01)
         shown = read_png(self.folder / "seen.png")
         np.testing.assert_allclose(decode_srgb(shown).reshape(3, -1), np.clip(seen, 0, 1), atol=0.02)
 

@@ -182,14 +182,15 @@ class Steps(PathTest):
 
     def test_interrupt_ends_an_acquisition_with_nothing_written(self):
         scene = self.scene(48, 36, 3)
-        for _ in range(3):
-            process = subprocess.Popen([PROGRAM, "acquire", "--scene", scene, "--scheme", "brute", "-o",
-                                        self.folder / "T.h5"], text=True, stderr=subprocess.PIPE)
+        for name, output, number in (("acquire", "T.h5", signal.SIGINT), ("acquire", "T.h5", signal.SIGTERM),
+                                     ("demo", "out", signal.SIGINT)):
+            process = subprocess.Popen([PROGRAM, name, "--scene", scene, "--scheme", "brute", "-o",
+                                        self.folder / output], text=True, stderr=subprocess.PIPE)
             self.wait_until_it_listens(process)
-            process.send_signal(signal.SIGINT)
+            process.send_signal(number)
             line = process.communicate(timeout=60)[1]
             self.assertEqual(process.returncode, 1, line)
-            self.assertEqual(line, "counterlight acquire: interrupted; nothing was written\n")
+            self.assertEqual(line, f"counterlight {name}: interrupted; nothing was written\n")
             self.assertEqual([p.name for p in self.folder.iterdir()], ["room.cfg"])
 
     def test_progress_shows_on_a_terminal_only(self):
