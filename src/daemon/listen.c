@@ -15,7 +15,7 @@
 #include "base/log.h"
 #include "daemon/peer.h"
 
-enum { BACKLOG = 16 };
+enum { BACKLOG = 128 };
 
 static clt_status take_passed(listener *out, int count, clt_error *error) {
   if (count != 1 || sd_is_socket_unix(SD_LISTEN_FDS_START, SOCK_STREAM, 1, NULL, 0) <= 0) {

@@ -3,6 +3,8 @@
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <ucontext.h>
+#include <unistd.h>
 
 #include "base/file.h"
 #include "base/log.h"
@@ -92,15 +94,28 @@ static clt_status run_threads(daemon_parts *parts, clt_error *error) {
   return CLT_OK;
 }
 
-/* Signals are taken by the control loop; every thread that is started later inherits this. */
+/* Runs in a thread that a library started before main and that therefore takes signals (OpenBLAS has such): it blocks
+ * the signal there and passes it on, until only the control loop's descriptor is left to take it. */
+static void pass_on(int number, siginfo_t *info, void *interrupted) {
+  (void)info;
+  sigaddset(&((ucontext_t *)interrupted)->uc_sigmask, number);
+  kill(getpid(), number);
+}
+
+/* Signals are taken by the control loop (signalfd); every thread that is started later inherits this. */
 static void block_signals(void) {
+  static const int numbers[] = {SIGTERM, SIGINT, SIGHUP};
+  const struct sigaction action = {.sa_sigaction = pass_on, .sa_flags = SA_SIGINFO | SA_RESTART};
   sigset_t taken;
   sigemptyset(&taken);
-  sigaddset(&taken, SIGTERM);
-  sigaddset(&taken, SIGINT);
-  sigaddset(&taken, SIGHUP);
-  sigaddset(&taken, SIGPIPE);
+  for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+    sigaddset(&taken, numbers[i]);
+  }
   pthread_sigmask(SIG_BLOCK, &taken, NULL);
+  for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+    sigaction(numbers[i], &action, NULL);
+  }
+  signal(SIGPIPE, SIG_IGN);
 }
 
 static int serve(const daemon_config *config, const daemon_overrides *overrides) {

@@ -5,10 +5,12 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/log.h"
 #include "daemon/control.h"
 
 typedef struct method {
   const char *name;
+  bool changes;          /* what the daemon does; such requests are logged with who asked */
   const char *params[3]; /* the keys it takes, ended by NULL */
   void (*answer)(control *self, client *from, const rpc_request *request);
 } method;
@@ -112,6 +114,9 @@ static void answer_hold(control *self, client *from, const rpc_request *request)
 }
 
 static void answer_resume(control *self, client *from, const rpc_request *request) {
+  if (self->state == STATE_HOLDING) {
+    self->why[0] = '\0';
+  }
   accept_event(self, from, request, EVENT_RESUME);
 }
 
@@ -145,10 +150,10 @@ static void answer_subscribe(control *self, client *from, const rpc_request *req
 }
 
 static const method methods[] = {
-    {"status", {NULL}, answer_status},     {"reacquire", {"scope", NULL}, answer_reacquire},
-    {"show", {"path", NULL}, answer_show}, {"hold", {NULL}, answer_hold},
-    {"resume", {NULL}, answer_resume},     {"snapshot", {NULL}, answer_snapshot},
-    {"reload", {NULL}, answer_reload},     {"subscribe", {NULL}, answer_subscribe},
+    {"status", false, {NULL}, answer_status},    {"reacquire", true, {"scope", NULL}, answer_reacquire},
+    {"show", true, {"path", NULL}, answer_show}, {"hold", true, {NULL}, answer_hold},
+    {"resume", true, {NULL}, answer_resume},     {"snapshot", false, {NULL}, answer_snapshot},
+    {"reload", true, {NULL}, answer_reload},     {"subscribe", false, {NULL}, answer_subscribe},
 };
 enum { METHOD_COUNT = sizeof methods / sizeof methods[0] };
 
@@ -192,6 +197,10 @@ void control_on_request(void *context, client *from, const rpc_request *request)
     snprintf(message, sizeof message, "%s takes no parameter \"%.64s\"", request->method, unknown);
     server_refuse(from, request, RPC_INVALID_PARAMS, message);
     return;
+  }
+  if (methods[i].changes) {
+    clt_log(CLT_LOG_INFO, "control socket: pid %ld uid %ld gid %ld asks to %s", (long)from->who.pid,
+            (long)from->who.uid, (long)from->who.gid, request->method);
   }
   methods[i].answer(context, from, request);
 }

@@ -83,7 +83,7 @@ static void encode_drive(output *main) {
 /* The panel's response before the rig tells: the configuration's, or the one that the scene suggests. */
 static clt_curve known_response(const output *main, const clt_station_config *config) {
   clt_rig_config suggested = config->rig;
-  if (main->station.scene != NULL && config->rig.width == 0) {
+  if (main->station.scene != NULL && !config->projector_response_given) {
     clt_scene_rig_config(main->station.scene, &suggested);
   }
   return suggested.projector;

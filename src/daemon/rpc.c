@@ -20,7 +20,7 @@ static bool take_id(rpc_request *request) {
 rpc_code rpc_parse(const char *line, size_t length, rpc_request *request, char *message, size_t size) {
   *request = (rpc_request){0};
   json_error_t problem;
-  request->document = json_loadb(line, length, JSON_REJECT_DUPLICATES, &problem);
+  request->document = json_loadb(line, length, JSON_REJECT_DUPLICATES | JSON_DECODE_ANY, &problem);
   if (request->document == NULL) {
     snprintf(message, size, "not one JSON document in a line: %s (column %d)", problem.text, problem.column);
     return RPC_PARSE_ERROR;

@@ -18,6 +18,7 @@ struct server {
   void *context;
   client *clients;
   int count;
+  bool complained; /* of a client that was refused, since the last one that was not */
 };
 
 static void drop(server *service, client *gone) {
@@ -89,7 +90,18 @@ static int on_client(sd_event_source *source, int descriptor, uint32_t events, v
   return 0;
 }
 
-/* Adds the client, or says why not and closes. */
+/* Tells a client why it is not served. A crowd of them is logged once. */
+static void turn_away(server *service, client *unwanted, const char *why) {
+  if (!service->complained) {
+    clt_log(CLT_LOG_WARNING, "control socket: pid %ld uid %ld refused: %s", (long)unwanted->who.pid,
+            (long)unwanted->who.uid, why);
+  }
+  service->complained = true;
+  client_send(unwanted, rpc_error(NULL, RPC_FAILED, why));
+  client_flush(unwanted);
+  client_destroy(unwanted);
+}
+
 static void admit(server *service, int descriptor) {
   peer who;
   if (!peer_read(descriptor, service->group, &who)) {
@@ -100,19 +112,16 @@ static void admit(server *service, int descriptor) {
   if (added == NULL) {
     return;
   }
-  bool allowed = peer_allowed(&who);
-  bool admitted = allowed && service->count < SERVER_CLIENTS_MOST &&
-                  sd_event_add_io(service->loop, &added->source, descriptor, EPOLLIN, on_client, added) >= 0;
-  if (!admitted) {
-    clt_log(CLT_LOG_WARNING, "control socket: pid %ld uid %ld refused: %s", (long)who.pid, (long)who.uid,
-            allowed ? "too many clients" : "neither root nor the daemon's user nor of its group");
-    client_send(added, rpc_error(NULL, RPC_FAILED, allowed ? "too many clients; close another one" : "not allowed"));
-    client_flush(added);
-    client_destroy(added);
+  if (!peer_allowed(&who)) {
+    turn_away(service, added, "not allowed: neither root nor the daemon's user nor of its group");
     return;
   }
-  clt_log(CLT_LOG_INFO, "control socket: pid %ld uid %ld gid %ld connected", (long)who.pid, (long)who.uid,
-          (long)who.gid);
+  if (service->count >= SERVER_CLIENTS_MOST ||
+      sd_event_add_io(service->loop, &added->source, descriptor, EPOLLIN, on_client, added) < 0) {
+    turn_away(service, added, "too many clients; close another one");
+    return;
+  }
+  service->complained = false;
   added->owner = service;
   added->next = service->clients;
   service->clients = added;

@@ -29,6 +29,8 @@ static void requests_are_told_from_the_rest(void **state) {
       {"{\"jsonrpc\":\"2.0\",\"method\":\"a\",\"method\":\"b\"}", RPC_PARSE_ERROR},
       {"{\"jsonrpc\":\"2.0\",\"method\":\"\xff\xfe\"}", RPC_PARSE_ERROR},
       {"[]", RPC_INVALID_REQUEST},
+      {"5", RPC_INVALID_REQUEST},
+      {"null", RPC_INVALID_REQUEST},
       {"[{\"jsonrpc\":\"2.0\",\"id\":1,\"method\":\"status\"}]", RPC_INVALID_REQUEST},
       {"{}", RPC_INVALID_REQUEST},
       {"{\"jsonrpc\":\"1.0\",\"id\":1,\"method\":\"status\"}", RPC_INVALID_REQUEST},
