@@ -11,6 +11,8 @@
 /* Light that is shared evenly at one level may still be uneven below, by chance or by symmetry: a spread is at least
  * this part of a block's light. */
 #define SPREAD_FLOOR (1.0f / 16)
+/* No light is below zero by more than this, in units of a channel's scale. */
+#define NEGATIVE_LIMIT 0.002f
 enum { WORTH_SHARING = 65536 }; /* leaves from which threads pay */
 
 static clt_status allocate_leaves(clt_row_trees *trees, clt_error *error) {
@@ -199,23 +201,22 @@ void clt_row_trees_correct(clt_row_trees *trees, const clt_pyramid *pyramid, int
 }
 
 /* Shares what count leaves lack to add up to total[c], whose variance is total_variance: the minimum-variance estimate
- * given one noisy sum. */
+ * given one noisy sum. Where nothing is uncertain the brightest leaf takes it. */
 static void share_missing(clt_row_trees *trees, int64_t first, int64_t count, const double *total,
                           double total_variance) {
   int channels = trees->channels;
+  int64_t brightest = first;
   double missing[4], variance = total_variance;
   memcpy(missing, total, (size_t)channels * sizeof *missing);
   for (int64_t e = first; e < first + count; e++) {
     variance += trees->variance[e];
+    brightest = largest_value(trees, e) > largest_value(trees, brightest) ? e : brightest;
     for (int c = 0; c < channels; c++) {
       missing[c] -= trees->value[e * channels + c];
     }
   }
-  if (!(variance > 0)) {
-    return;
-  }
   for (int64_t e = first; e < first + count; e++) {
-    double gain = trees->variance[e] / variance;
+    double gain = variance > 0 ? trees->variance[e] / variance : e == brightest;
     for (int c = 0; c < channels; c++) {
       trees->value[e * channels + c] += (float)(gain * missing[c]);
     }
@@ -244,7 +245,7 @@ static float unevenness(const clt_row_trees *before, int64_t parent, const clt_r
 
 /* The last child of four was not photographed: all that is known is that its family adds up to the parent. Where one
  * sibling holds the cell's own light, the difference of two bright measurements says less than the two dim siblings do:
- * the light is expected to be like theirs, unless more is missing than noise explains. */
+ * the light is expected to be like theirs, unless more is missing than noise explains (too little is always noise). */
 static void expect_last_child(clt_row_trees *trees, int64_t first, const double *total, double total_variance) {
   int channels = trees->channels;
   int64_t last = first + 3, brightest = first;
@@ -264,7 +265,7 @@ static void expect_last_child(clt_row_trees *trees, int64_t first, const double 
     dim = e == brightest ? dim : fmax(dim, pow(largest_value(trees, e), 2) + trees->variance[e]);
   }
   for (int c = 0; c < channels; c++) {
-    largest = fmax(largest, fabs(missing[c] - mean[c]));
+    largest = fmax(largest, missing[c] - mean[c]);
   }
   if (largest * largest < NOISE_FLOOR * NOISE_FLOOR * (noise + dim) && dim < trees->variance[last]) {
     trees->variance[last] = (float)dim;
@@ -307,24 +308,35 @@ void clt_row_trees_settle(clt_row_trees *after, const clt_row_trees *before, con
   }
 }
 
-/* Light is not negative: what noise put below zero is put at zero, the nearest value that can be. */
-static void drop_negative(clt_row_trees *trees, size_t i) {
-  for (int64_t at = trees->start[i] * trees->channels; at < trees->start[i + 1] * trees->channels; at++) {
-    trees->value[at] = fmaxf(trees->value[at], 0);
+/* Light is not negative: what lies below zero beyond noise was taken for another block's, and stays zero from now on.
+ */
+static void clip_negative(clt_row_trees *trees, size_t i) {
+  for (int64_t e = trees->start[i]; e < trees->start[i + 1]; e++) {
+    float least = -fminf(NOISE_FLOOR * sqrtf(trees->variance[e]), NEGATIVE_LIMIT);
+    for (int c = 0; c < trees->channels; c++) {
+      float *value = &trees->value[e * trees->channels + c];
+      if (*value < least) {
+        *value = 0;
+        trees->variance[e] = 0;
+      }
+    }
   }
 }
 
 void clt_row_trees_match_flood(clt_row_trees *trees, const clt_image *flood, const double *scale,
                                const float *variance) {
+  enum { ROUNDS = 3 }; /* sharing may push other leaves below zero */
 #pragma omp parallel for schedule(static) if (trees->start[trees->rows] >= WORTH_SHARING)
   for (size_t i = 0; i < trees->rows; i++) {
     double total[4];
     for (int c = 0; c < trees->channels; c++) {
       total[c] = flood->data[(size_t)c * trees->rows + i] / scale[c];
     }
-    drop_negative(trees, i);
-    if (isfinite(variance[i])) {
-      share_missing(trees, trees->start[i], trees->start[i + 1] - trees->start[i], total, 0);
+    for (int round = 0; round < ROUNDS; round++) {
+      clip_negative(trees, i);
+      if (isfinite(variance[i])) {
+        share_missing(trees, trees->start[i], trees->start[i + 1] - trees->start[i], total, 0);
+      }
     }
   }
 }

@@ -50,8 +50,8 @@ void clt_row_trees_correct(clt_row_trees *trees, const clt_pyramid *pyramid, int
  * variance, and sets the children's spreads from how unevenly the parent's light turned out to be shared. */
 void clt_row_trees_settle(clt_row_trees *after, const clt_row_trees *before, const clt_pyramid *pyramid, int level);
 
-/* Puts negative leaves at zero and makes the leaves of every row add up to its flood exactly, each giving way by its
- * variance. */
+/* Clips what is negative beyond noise, then makes the leaves of every row add up to its flood exactly, each giving way
+ * by its variance. */
 void clt_row_trees_match_flood(clt_row_trees *trees, const clt_image *flood, const double *scale,
                                const float *variance);
 

@@ -195,6 +195,38 @@ static void channels_share_their_patterns(void **state) {
   free(all);
 }
 
+/* Noisy light must neither leave entries that a transport file refuses (below -1 % of the largest) nor spoil the row
+ * sums: here the own light of a cell is uncertain by 2 %. */
+static void noise_leaves_no_negative_light(void **state) {
+  (void)state;
+  enum { WIDTH = 40, HEIGHT = 26, CELLS = WIDTH * HEIGHT };
+  test_room room = make_room(WIDTH, HEIGHT, 0.7);
+  static const double thresholds[] = {0.05, 0.005, 0.001};
+  for (int n = 0; n < 3; n++) {
+    fake_rig rig = fake_rig_make(WIDTH, HEIGHT, 1, room.transport, 1);
+    rig.dark = 1e-4;
+    rig.photon = 4e-4;
+    clt_transport *transport = NULL;
+    clt_error error = {0};
+    clt_acquire_options options = {.scheme = "hierarchical", .threshold = thresholds[n]};
+    assert_ok(clt_acquire(&rig.base, &options, &transport, &error), error);
+    const float *entries = clt_transport_entries(transport, 0), *flood = clt_transport_flood(transport, 0);
+    double least = 0, largest = 0;
+    for (size_t i = 0; i < CELLS; i++) {
+      double sum = 0;
+      for (size_t j = 0; j < CELLS; j++) {
+        sum += entries[i * CELLS + j];
+        least = fmin(least, entries[i * CELLS + j]);
+        largest = fmax(largest, entries[i * CELLS + j]);
+      }
+      assert_near(sum, flood[i], 1e-5 * flood[i]);
+    }
+    assert_true(least > -0.005 * largest);
+    clt_transport_destroy(transport);
+  }
+  free(room.transport);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(fewer_patterns_and_errors_than_the_prototype),
@@ -203,6 +235,7 @@ int main(void) {
       cmocka_unit_test(sharp_indirect_light_is_found),
       cmocka_unit_test(large_grids_become_trees),
       cmocka_unit_test(channels_share_their_patterns),
+      cmocka_unit_test(noise_leaves_no_negative_light),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
