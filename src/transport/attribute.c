@@ -43,17 +43,44 @@ clt_status clt_hdf_read_number(const clt_hdf *hdf, const char *name, double *val
   return status;
 }
 
-/* Copies at most size - 1 bytes and never half a UTF-8 character. */
-static void copy_text(char *text, size_t size, const char *from, size_t length) {
-  length = strnlen(from, length);
-  if (length >= size) {
-    length = size - 1;
-    while (length > 0 && ((unsigned char)from[length] & 0xc0) == 0x80) {
-      length--;
-    }
+/* Bytes of the UTF-8 character that `from` begins with (RFC 3629), 0 where it is none. */
+static size_t character_length(const unsigned char *from, size_t room) {
+  static const unsigned first_code[] = {0, 0, 0x80, 0x800, 0x10000};
+  size_t length = from[0] < 0x80 ? 1 : from[0] >> 5 == 6 ? 2 : from[0] >> 4 == 14 ? 3 : from[0] >> 3 == 30 ? 4 : 0;
+  if (length < 2 || length > room) {
+    return length == 1 ? 1 : 0;
   }
-  memcpy(text, from, length);
-  text[length] = '\0';
+  unsigned code = from[0] & (0x7fu >> length);
+  for (size_t k = 1; k < length; k++) {
+    if (from[k] >> 6 != 2) {
+      return 0;
+    }
+    code = code << 6 | (from[k] & 0x3fu);
+  }
+  bool surrogate = code >= 0xd800 && code < 0xe000;
+  return code >= first_code[length] && code <= 0x10ffff && !surrogate ? length : 0;
+}
+
+/* Copies what fits of one line of UTF-8, whole characters only; '?' stands for what is none and for control characters,
+ * so that the text may go into messages and JSON. */
+static void copy_text(char *text, size_t size, const char *from, size_t length) {
+  const unsigned char *bytes = (const unsigned char *)from;
+  size_t used = 0, step;
+  length = strnlen(from, length);
+  for (size_t i = 0; i < length; i += step) {
+    size_t known = character_length(bytes + i, length - i);
+    step = known == 0 ? 1 : known;
+    if (used + step >= size) {
+      break;
+    }
+    if (known == 0 || bytes[i] < 0x20 || bytes[i] == 0x7f) {
+      text[used] = '?';
+    } else {
+      memcpy(text + used, bytes + i, step);
+    }
+    used += step;
+  }
+  text[used] = '\0';
 }
 
 static clt_status read_variable(const clt_hdf *hdf, const char *name, hid_t attribute, hid_t type, char *text,

@@ -125,12 +125,14 @@ static const H5FD_class_t sink_class = {.name = "counterlight sink",
                                         .truncate = sink_truncate,
                                         .fl_map = H5FD_FLMAP_DICHOTOMY};
 
+/* The format of HDF5 1.8 has check sums over a file's structure, which the older one, HDF5's default, has not. */
 hid_t clt_sink_create(clt_sink *sink, const char *name) {
   const sink_target target = {sink};
   hid_t driver = H5FDregister(&sink_class);
   hid_t access = H5Pcreate(H5P_FILE_ACCESS);
   hid_t file = H5I_INVALID_HID;
-  if (driver >= 0 && access >= 0 && H5Pset_driver(access, driver, &target) >= 0) {
+  if (driver >= 0 && access >= 0 && H5Pset_driver(access, driver, &target) >= 0 &&
+      H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18) >= 0) {
     file = H5Fcreate(name, H5F_ACC_TRUNC, H5P_DEFAULT, access);
   }
   if (access >= 0) {

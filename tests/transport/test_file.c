@@ -38,19 +38,15 @@ static void assert_same_planes(const clt_transport *a, const clt_transport *b) {
   }
 }
 
-/* The products' bits agree; with x = unit vectors that is every entry. */
-static void assert_same_entries(const clt_transport *a, const clt_transport *b) {
+/* Products with a random vector agree in every bit; one entry that differs would change them. */
+static void assert_same_entries(const clt_transport *a, const clt_transport *b, uint64_t *state) {
   clt_transport_info info = clt_transport_describe(a);
-  double *x = calloc(info.cols, sizeof *x);
+  double *x = random_vector(info.cols, state);
   double *ya = calloc(info.rows, sizeof *ya), *yb = calloc(info.rows, sizeof *yb);
   for (int c = 0; c < info.channels; c++) {
-    for (size_t j = 0; j < info.cols; j++) {
-      x[j] = 1;
-      clt_transport_apply(a, c, x, ya);
-      clt_transport_apply(b, c, x, yb);
-      assert_memory_equal(ya, yb, info.rows * sizeof *ya);
-      x[j] = 0;
-    }
+    clt_transport_apply(a, c, x, ya);
+    clt_transport_apply(b, c, x, yb);
+    assert_memory_equal(ya, yb, info.rows * sizeof *ya);
   }
   free(x);
   free(ya);
@@ -76,7 +72,7 @@ static void round_trip(make_known make, const size_case *size, uint64_t seed) {
   assert_string_equal(before.storage, after.storage);
   assert_memory_equal(clt_transport_origin(known.transport), clt_transport_origin(loaded), sizeof(clt_provenance));
   assert_same_planes(known.transport, loaded);
-  assert_same_entries(known.transport, loaded);
+  assert_same_entries(known.transport, loaded, &seed);
   clt_transport_destroy(loaded);
   finish_known(&known);
   unlink(path);

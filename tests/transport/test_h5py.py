@@ -1,0 +1,365 @@
+"""Transport files written by h5py: every style of attribute loads, every malformed one is refused with a reason.
+
+Usage: test_h5py.py SHOW, the built show_transport."""
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+try:
+    import h5py
+    import numpy as np
+except ImportError:
+    sys.exit(77)
+
+SHOW = ''
+W, H, C, N = 5, 3, 2, 15
+
+
+def show(path, *more):
+    run = subprocess.run([SHOW, path, *more], capture_output=True, timeout=60)
+    if run.stderr:
+        raise AssertionError('HDF5 or a sanitizer printed: ' + run.stderr.decode(errors='replace')[-2000:])
+    return run.returncode, json.loads(run.stdout)
+
+
+def entries(rows=N, channels=C, seed=1):
+    return np.random.default_rng(seed).random((channels, rows, N)).astype('f4')
+
+
+def write(path, dense, **attributes):
+    """The five lines of docs/transport-file.md."""
+    values = {'format': 'counterlight-transport', 'version': 1, 'width': W, 'height': H, 'channels': len(dense)}
+    values.update(attributes)
+    with h5py.File(path, 'w') as file:
+        for name, value in values.items():
+            if value is not None:
+                file.attrs[name] = value
+        file['dense'] = dense
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        self.path = os.path.join(folder.name, 'T.h5')
+
+    def loads(self, dense):
+        code, answer = show(self.path)
+        self.assertEqual(code, 0, answer)
+        dense = np.asarray(dense, 'f4').astype(float)
+        rows = dense.shape[1]
+        self.assertEqual((answer['rows'], answer['channels']), (rows, len(dense)))
+        for c in range(len(dense)):
+            np.testing.assert_allclose(answer['forward'][c], dense[c] @ (1.0 + np.arange(N)), rtol=1e-12)
+            np.testing.assert_allclose(answer['backward'][c], (1.0 + np.arange(rows)) @ dense[c], rtol=1e-12)
+        return answer
+
+    def refused(self, *words):
+        code, answer = show(self.path)
+        self.assertEqual(code, 2, answer)
+        for word in (os.path.basename(self.path),) + words:
+            self.assertIn(word, answer['message'])
+        self.assertNotIn('\n', answer['message'])
+
+
+class Accepted(Case):
+    def test_five_lines(self):
+        dense = entries()
+        write(self.path, dense)
+        answer = self.loads(dense)
+        self.assertEqual(answer['black'], [[0] * N] * C)
+        self.assertEqual(answer['flood'], [None] * C)
+        self.assertEqual((answer['scheme'], answer['acquired'], answer['error']), ('', 0, -1))
+
+    def test_text_styles(self):
+        dense = entries()
+        text = 'counterlight-transport'
+        for style in (text, text.encode(), np.bytes_(text), np.array(text.encode(), 'S40'), [text], [text.encode()],
+                      np.array(text, dtype=h5py.string_dtype('ascii')), np.array(text, dtype=h5py.string_dtype('utf-8')),
+                      np.array(text.encode(), dtype=h5py.string_dtype('utf-8', 30))):
+            with self.subTest(style=repr(style)):
+                write(self.path, dense, format=style, source=style)
+                self.assertEqual(self.loads(dense)['source'], text)
+        space = h5py.h5t.C_S1.copy()
+        space.set_size(30)
+        space.set_strpad(h5py.h5t.STR_SPACEPAD)
+        write(self.path, dense, format=None)
+        with h5py.File(self.path, 'a') as file:
+            attribute = h5py.h5a.create(file.id, b'format', space, h5py.h5s.create(h5py.h5s.SCALAR))
+            attribute.write(np.array(text.ljust(30).encode(), 'S30'), mtype=space)
+        self.loads(dense)
+
+    def test_number_styles(self):
+        dense = entries()
+        for kind in ('i1', 'u1', '>i2', 'u2', 'i4', '>u4', 'i8', 'u8', 'f4', 'f8'):
+            with self.subTest(kind=kind):
+                write(self.path, dense, version=np.array(1, kind), width=np.array([W], kind), height=np.array(H, kind),
+                      channels=np.array([[C]], kind))
+                self.loads(dense)
+
+    def test_value_styles(self):
+        whole = (entries() * 100).round()
+        for kind in ('f8', '>f4', 'f2', 'i4', 'u1'):
+            with self.subTest(kind=kind):
+                write(self.path, whole.astype(kind))
+                self.loads(whole)
+        packed = entries()
+        write(self.path, packed)
+        with h5py.File(self.path, 'a') as file:
+            del file['dense']
+            file.create_dataset('dense', data=packed, chunks=(1, 4, 4), compression='gzip', shuffle=True)
+        self.loads(packed)
+
+    def test_rows_and_planes(self):
+        rows = 23
+        dense = entries(rows)
+        black = np.random.default_rng(2).random((C, rows))
+        sigma = black / 10
+        sigma[1, 3] = np.inf
+        write(self.path, dense)
+        with h5py.File(self.path, 'a') as file:
+            file['black'] = black - 0.5
+            file['flood'] = black
+            file['sigma'] = sigma
+        answer = self.loads(dense)
+        np.testing.assert_array_equal(answer['black'], (black - 0.5).astype('f4'))
+        np.testing.assert_array_equal(answer['flood'], black.astype('f4'))
+        self.assertEqual(answer['sigma'][1][3], 'infinite')
+
+    def test_empty_parts(self):
+        dense = entries()
+        write(self.path, dense, scheme=h5py.Empty('f'), seconds=h5py.Empty('f8'), error=np.nan)
+        with h5py.File(self.path, 'a') as file:
+            file['black'] = h5py.Empty('f4')
+        self.assertEqual(self.loads(dense)['error'], -1)
+
+    def test_provenance(self):
+        dense = entries()
+        write(self.path, dense, scheme='brute', source='W\u00e4nde' + 'x' * 200, response='\u00e9' * 100,
+              acquired=1791234567, patterns=np.uint8(87), frames=261.0, seconds=np.float32(12.5), error=0.25)
+        answer = self.loads(dense)
+        self.assertEqual(answer['source'], ('W\u00e4nde' + 'x' * 200)[:126])
+        self.assertEqual(answer['response'], '\u00e9' * 63)
+        self.assertEqual([answer[k] for k in ('scheme', 'acquired', 'patterns', 'frames', 'seconds', 'error')],
+                         ['brute', 1791234567, 87, 261, 12.5, 0.25])
+        write(self.path, dense, patterns=1e30, frames=-np.inf, acquired=2**64 - 1, seconds=np.inf)
+        answer = self.loads(dense)
+        self.assertEqual([answer[k] for k in ('acquired', 'patterns', 'frames', 'seconds')], [0, 0, 0, 0])
+
+    def test_text_is_cleaned(self):
+        """What comes out is one line of valid UTF-8, whatever went in."""
+        dense = entries()
+        for raw, wanted in ((b'W\xe4nde', 'W?nde'), (b'a\nb\x1b[1m\x7f', 'a?b?[1m?'), (b'\xc0\xafx', '??x'), (b'\xe2\x82', '??'),
+                            (b'\xed\xa0\x80', '???'), (b'\xf4\x90\x80\x80', '????'), (b'\xf5', '?'),
+                            ('\u20ac\U0001f4a1\u00e9'.encode(), '\u20ac\U0001f4a1\u00e9')):
+            with self.subTest(raw=raw):
+                write(self.path, dense, source=np.bytes_(raw))
+                self.assertEqual(self.loads(dense)['source'], wanted)
+
+    def test_noise(self):
+        dense = entries()
+        dense[0, 0, 0], dense[1, 2, 3] = 1, -0.0099
+        write(self.path, dense)
+        self.loads(dense)
+
+    def test_other_things_in_the_file(self):
+        dense = entries()
+        write(self.path, dense, comment='mine', table=np.arange(5))
+        with h5py.File(self.path, 'a') as file:
+            file['notes/list'] = [1, 2, 3]
+        self.loads(dense)
+
+    def test_tree(self):
+        write(self.path, entries())
+        with h5py.File(self.path, 'a') as file:
+            del file['dense']
+            file['tree/start'] = np.array([0, 2, 2, 5])
+            file['tree/node'] = [0, 14, 15, 23, 21]  # two cells; the first 2 x 2 block, the grid, the first 4 x 4 block
+            file['tree/value'] = np.array([[1, 2, 3, 4, 5], [6, 7, 8, 9, 10]]) / 16
+        code, answer = show(self.path)
+        self.assertEqual(code, 0, answer)
+        masks = np.zeros((5, H, W))
+        masks[0, 0, 0] = masks[1, 2, 4] = masks[2, :2, :2] = masks[3] = masks[4, :, :4] = 1
+        for c in range(C):
+            value = np.arange(1, 6) + 5 * c
+            rows = np.stack([np.tensordot(value[:2], masks[:2], 1), 0 * masks[0], np.tensordot(value[2:], masks[2:], 1)])
+            dense = rows.reshape(3, N) / 16
+            np.testing.assert_allclose(answer['forward'][c], dense @ (1.0 + np.arange(N)), rtol=1e-14)
+            np.testing.assert_allclose(answer['backward'][c], (1.0 + np.arange(3)) @ dense, rtol=1e-14)
+
+    def test_saved_file_reads_back(self):
+        dense, copy = entries(), os.path.join(self.folder, 'copy.h5')
+        write(self.path, dense, source='W\u00e4nde', acquired=1791234567)
+        self.assertEqual(show(self.path, copy), show(copy))
+        with h5py.File(copy) as file:
+            np.testing.assert_array_equal(file['dense'][:], dense)
+            self.assertEqual(file['black'].shape, (C, N))
+            self.assertEqual(file.attrs['format'], 'counterlight-transport')
+            self.assertEqual(file.attrs['storage'], 'dense')
+            self.assertEqual(file.attrs['source'], 'W\u00e4nde')
+            self.assertEqual([int(file.attrs[k]) for k in ('version', 'width', 'height', 'channels', 'acquired')],
+                             [1, W, H, C, 1791234567])
+
+
+    def test_rendered_transport(self):
+        """A transport from an independent path tracer, written by its own few lines of h5py."""
+        here = os.path.dirname(os.path.abspath(__file__))
+        shared = os.environ.get('CLT_SHARED', os.path.join(here, '..', '..', '..', 'shared'))
+        path = os.path.join(shared, 'data', 'cycles-dihedral.h5')
+        if not os.path.exists(path):
+            self.skipTest('no ' + path)
+        code, answer = show(path)
+        self.assertEqual(code, 0, answer)
+        with h5py.File(path) as file:
+            dense = file['dense'][:].astype(float)
+            np.testing.assert_allclose(answer['forward'][0], dense[0] @ (1.0 + np.arange(768)), rtol=1e-12)
+            np.testing.assert_array_equal(answer['black'], file['black'][:])
+            np.testing.assert_array_equal(answer['flood'], file['flood'][:])
+
+
+class Refused(Case):
+    def test_attributes(self):
+        cases = [
+            (dict(format=None), 'format'), (dict(format='other'), 'format'), (dict(format=7), 'format'),
+            (dict(format=['a', 'b']), 'format'), (dict(version=None), 'version'), (dict(version=2), 'version 2'),
+            (dict(version=0), 'version'), (dict(version='one'), 'version'), (dict(version=np.nan), 'version'),
+            (dict(width=None), 'width'), (dict(width=0), 'width'), (dict(width=-5), '-5'), (dict(width=5.5), '5.5'),
+            (dict(width=16385), '16384'), (dict(width=2**40), 'width'), (dict(width=2**63), 'width'),
+            (dict(width=[5, 5]), 'width'), (dict(width=np.inf), 'width'), (dict(height='3'), 'height'),
+            (dict(height=4), '[2, 15, 15]'), (dict(width=16384, height=16384), '/dense'), (dict(channels=3), '/dense'),
+            (dict(channels=5), 'channels'), (dict(channels=0), 'channels'), (dict(source=5), 'source'),
+            (dict(seconds='long'), 'seconds'), (dict(patterns=[1, 2]), 'patterns'),
+        ]
+        for attributes, word in cases:
+            with self.subTest(**attributes):
+                write(self.path, entries(), **attributes)
+                self.refused(word)
+
+    def test_shapes(self):
+        cases = [entries()[0], entries()[:, :, 1:], entries()[:, :0], entries()[None], np.float32(1),
+                 np.empty((C, 0, N), 'f4')]
+        for dense in cases:
+            with self.subTest(shape=dense.shape):
+                write(self.path, entries())
+                with h5py.File(self.path, 'a') as file:
+                    del file['dense']
+                    file['dense'] = dense
+                self.refused()
+
+    def test_values(self):
+        for value, word in ((np.nan, 'NaN'), (np.inf, 'infinite'), (-np.inf, 'infinite'), (-0.0101, '-0.01'),
+                            (1e300, 'infinite')):
+            with self.subTest(value=value):
+                dense = entries().astype('f8')
+                dense[0, 0, 0] = 1
+                dense[1, 2, 3] = value
+                write(self.path, dense)
+                self.refused('/dense[1, 2, 3]', word)
+
+    def test_planes(self):
+        good = np.zeros((C, N))
+        for name in ('black', 'flood', 'sigma'):
+            for value in (good[:, 1:], good[0], good[:1], np.float32(0)):
+                with self.subTest(name=name, shape=np.shape(value)):
+                    write(self.path, entries())
+                    with h5py.File(self.path, 'a') as file:
+                        file[name] = value
+                    self.refused('/' + name, '[2, 15]')
+            bad = good.copy()
+            bad[1, 4] = np.nan
+            write(self.path, entries())
+            with h5py.File(self.path, 'a') as file:
+                file[name] = bad
+            self.refused('/%s[1, 4]' % name, 'NaN')
+
+    def test_types(self):
+        for dense in (np.full((C, N, N), b'x'), np.zeros((C, N, N), 'c8'),
+                      np.zeros((C, N, N), [('a', 'f4'), ('b', 'f4')])):
+            with self.subTest(kind=dense.dtype):
+                write(self.path, dense)
+                self.refused('/dense', 'numbers')
+
+    def test_missing(self):
+        for make, word in ((lambda file: file.pop('dense'), '/dense'),
+                           (lambda file: file.move('dense', 'tree'), '/tree'),
+                           (lambda file: (file.pop('dense'), file.create_group('tree')), '/tree/start'),
+                           (lambda file: (file.pop('dense'), file.create_group('dense')), '/dense'),
+                           (lambda file: (file.pop('dense'), file.__setitem__('dense', h5py.SoftLink('/gone'))), '/dense'),
+                           (lambda file: file.create_group('black'), '/black')):
+            write(self.path, entries())
+            with h5py.File(self.path, 'a') as file:
+                make(file)
+            self.refused(word)
+
+    def test_trees(self):
+        good = dict(start=[0, 2, 3], node=[0, 1, 23], value=np.ones((C, 3)))
+        for change, word in ((dict(start=[0, 3, 2]), '/tree/start[2]'), (dict(start=[0, 4, 3]), '/tree/start[1]'),
+                             (dict(start=[1, 2, 3]), '/tree/start[0]'), (dict(start=[0]), '/tree/start'),
+                             (dict(start=np.zeros(0, 'i8')), '/tree/start'), (dict(start=[0, 2, 2**62]), '/tree/start'),
+                             (dict(start=[0, -1, 3]), '/tree/start[1]'), (dict(node=[0, 1, 24]), '/tree/node[2]'),
+                             (dict(node=[0, -1, 2]), '/tree/node[1]'), (dict(node=[0, 2**40, 2]), '/tree/node[1]'),
+                             (dict(node=[0, 1]), '/tree/value'), (dict(value=np.ones((C, 4))), '/tree/value'),
+                             (dict(value=np.ones((1, 3))), '/tree/value'),
+                             (dict(value=[[1, 1, 1], [1, np.nan, 1]]), '/tree/value[1, 1]'),
+                             (dict(value=[[1, 1, -1], [1, 1, 1]]), '/tree/value[0, 2]')):
+            with self.subTest(**{name: repr(value) for name, value in change.items()}):
+                write(self.path, entries())
+                with h5py.File(self.path, 'a') as file:
+                    del file['dense']
+                    for name, value in {**good, **change}.items():
+                        file['tree/' + name] = value
+                self.refused(word)
+
+    def test_hollow(self):
+        """Sizes that the file does not hold are refused before memory is taken for them."""
+        write(self.path, entries())
+        with h5py.File(self.path, 'a') as file:
+            del file['dense']
+            file.create_dataset('dense', (C, 2**28, N), 'f4', chunks=(1, 1024, N))
+        self.refused('/dense', 'more values than the file holds')
+
+    def test_no_transport(self):
+        self.refused('No such file')
+        os.mkdir(self.path)
+        self.refused('not a file')
+        os.rmdir(self.path)
+        for content in (b'', b'hello', b'\x89HDF\r\n\x1a\n', os.urandom(4096)):
+            with open(self.path, 'wb') as file:
+                file.write(content)
+            self.refused()
+        os.remove(self.path)
+        os.mkfifo(self.path)
+        self.refused('not a file')
+
+
+class Damaged(Case):
+    def test_heap(self):
+        """The heap of strings has no check sum: HDF5 1.10 itself crashes or hangs over some of these."""
+        write(self.path, entries(), source='a scene')
+        with open(self.path, 'rb') as file:
+            whole = file.read()
+        heap = whole.index(b'GCOL')
+        for place in range(heap, heap + 64, 3):
+            for value in (0x81, 0xff):
+                with open(self.path, 'wb') as file:
+                    file.write(whole[:place] + bytes([value]) + whole[place + 1:])
+                code, answer = show(self.path)
+                self.assertIn(code, (0, 2), (place - heap, value, answer))
+
+    def test_truncated(self):
+        write(self.path, entries())
+        with open(self.path, 'rb') as file:
+            whole = file.read()
+        for kept in np.linspace(0, len(whole) - 1, 40).astype(int):
+            with open(self.path, 'wb') as file:
+                file.write(whole[:kept])
+            self.refused()
+
+
+if __name__ == '__main__':
+    SHOW = sys.argv.pop(1)
+    unittest.main()
