@@ -39,9 +39,12 @@ clt_status clt_place_own_socket(char *out, clt_error *error) {
   if (geteuid() == 0) {
     return place(system_socket, "", out, error);
   }
-  char own[48];
-  snprintf(own, sizeof own, "/tmp/counterlight-%lu", (unsigned long)geteuid());
-  return user != NULL ? place(user, "/counterlight/control.sock", out, error) : place(own, "/control.sock", out, error);
+  if (user != NULL) {
+    return place(user, "/counterlight/control.sock", out, error);
+  }
+  char state[CLT_PATH_MAX];
+  clt_status status = clt_place_state(state, error);
+  return status == CLT_OK ? place(state, "/control.sock", out, error) : status;
 }
 
 clt_status clt_place_socket(char *out, clt_error *error) {
@@ -69,7 +72,7 @@ clt_status clt_place_state(char *out, clt_error *error) {
                       : place(home, "/.local/state/counterlight", out, error);
 }
 
-clt_status clt_place_make_folder(const char *path, clt_error *error) {
+clt_status clt_place_make_folder(const char *path, unsigned mode, clt_error *error) {
   char part[CLT_PATH_MAX];
   snprintf(part, sizeof part, "%s", path);
   for (char *slash = part; slash != NULL;) {
@@ -78,7 +81,7 @@ clt_status clt_place_make_folder(const char *path, clt_error *error) {
       *slash = '\0';
     }
     struct stat found;
-    if (stat(part, &found) != 0 && mkdir(part, 0750) != 0 && errno != EEXIST) {
+    if (stat(part, &found) != 0 && mkdir(part, (mode_t)mode) != 0 && errno != EEXIST) {
       return clt_fail(error, CLT_FAILED, "%s: the folder cannot be made: %s; make it or choose another", part,
                       strerror(errno));
     }

@@ -177,25 +177,23 @@ static void print_notification(const json_t *notification, const cli_arguments *
   fflush(stdout);
 }
 
-/* Prints notifications until one says a state that `enough` accepts; *last (the caller's) is what it says. The state at
- * the beginning counts where it is not NULL. */
+/* Prints notifications until one says a state that `enough` accepts; *last (the caller's) is what it says. `first` is
+ * the state at the beginning, taken over: it is printed and counts like a notification. */
 static clt_status follow(cli_link *connection, const cli_arguments *arguments, json_t *first,
                          bool (*enough)(const char *state, const void *context), const void *context, json_t **last,
                          clt_error *error) {
+  json_t *notification = json_pack("{s:s, s:s, s:o}", "jsonrpc", "2.0", "method", "state", "params", first);
   clt_status status = CLT_OK;
-  json_t *notification =
-      first != NULL ? json_pack("{s:s, s:s, s:o}", "jsonrpc", "2.0", "method", "state", "params", first) : NULL;
-  bool done = false;
-  while (status == CLT_OK && !done) {
-    status = notification == NULL ? cli_link_next(connection, &notification, error) : CLT_OK;
-    if (status == CLT_OK) {
-      json_t *params = json_object_get(notification, "params");
-      print_notification(notification, arguments);
-      done = strcmp(text_of(notification, "method"), "state") == 0 && enough(text_of(params, "state"), context);
-      *last = done ? json_incref(params) : NULL;
-      json_decref(notification);
-      notification = NULL;
+  *last = NULL;
+  while (status == CLT_OK && *last == NULL) {
+    json_t *params = json_object_get(notification, "params");
+    print_notification(notification, arguments);
+    if (strcmp(text_of(notification, "method"), "state") == 0 && enough(text_of(params, "state"), context)) {
+      *last = json_incref(params);
     }
+    json_decref(notification);
+    notification = NULL;
+    status = *last == NULL ? cli_link_next(connection, &notification, error) : CLT_OK;
   }
   return status;
 }
@@ -246,13 +244,12 @@ static clt_status reacquire_and_wait(const cli_command *command, const cli_argum
   status = status == CLT_OK
                ? cli_link_call(&connection, "reacquire", scope_params(command, arguments), -1, &begun, error)
                : status;
-  status = status == CLT_OK ? follow(&connection, arguments, NULL, is_settled, NULL, last, error) : status;
+  status = status == CLT_OK ? follow(&connection, arguments, begun, is_settled, NULL, last, error) : status;
   if (status == CLT_OK && strcmp(text_of(*last, "state"), "showing") != 0) {
     status = clt_fail(error, CLT_FAILED, "the acquisition ended in state %s: %s; the earlier picture stays up",
                       text_of(*last, "state"), text_of(*last, "why"));
   }
   json_decref(reply);
-  json_decref(begun);
   cli_link_close(&connection);
   return status;
 }

@@ -76,9 +76,11 @@ bool client_receive(client *connection) {
 }
 
 static bool make_room(client *connection, size_t length) {
-  memmove(connection->output, connection->output + connection->sent, connection->used - connection->sent);
-  connection->used -= connection->sent;
-  connection->sent = 0;
+  if (connection->sent > 0) {
+    memmove(connection->output, connection->output + connection->sent, connection->used - connection->sent);
+    connection->used -= connection->sent;
+    connection->sent = 0;
+  }
   if (connection->used + length <= connection->room) {
     return true;
   }

@@ -102,6 +102,7 @@ static int on_signal(sd_event_source *source, const struct signalfd_siginfo *sig
   if (signal->ssi_signo == SIGHUP) {
     control_reload(self, &restart, &error);
   } else {
+    clt_log(CLT_LOG_NOTICE, "asked to stop by signal %u", signal->ssi_signo);
     control_event(self, EVENT_STOP);
   }
   return 0;

@@ -46,7 +46,7 @@ static int check(const daemon_config *config) {
 static void make_socket_folder(const char *path) {
   char folder[CLT_PATH_MAX];
   clt_file_folder(path, folder);
-  clt_place_make_folder(folder, NULL);
+  clt_place_make_folder(folder, 0755, NULL);
 }
 
 static clt_status open_parts(const daemon_config *config, const daemon_overrides *overrides, daemon_parts *parts,

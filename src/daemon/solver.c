@@ -200,7 +200,7 @@ static clt_status snapshot(solver *self, solver_job *job, solver_result *result)
   clt_error *error = &result->error;
   const daemon_picture *picture = &job->picture;
   clt_status status = store_path(self->state, "snapshot", folder, error);
-  status = status == CLT_OK ? clt_place_make_folder(folder, error) : status;
+  status = status == CLT_OK ? clt_place_make_folder(folder, 0750, error) : status;
   status = status == CLT_OK ? clt_curve_parse(job->response, &response, error) : status;
   status = status == CLT_OK ? store_path(self->state, "snapshot/drive.png", path, error) : status;
   status = status == CLT_OK ? clt_image_write(path, &response, &picture->drive, error) : status;

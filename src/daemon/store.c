@@ -58,7 +58,7 @@ clt_status store_open(const char *folder, store *out, clt_error *error) {
   snprintf(out->folder, sizeof out->folder, "%s", folder);
   clt_error problem = {0};
   clt_status status = CLT_OK;
-  if (clt_place_make_folder(folder, &problem) == CLT_OK) {
+  if (clt_place_make_folder(folder, 0750, &problem) == CLT_OK) {
     status = take_lock(out, error);
   }
   if (status == CLT_OK && !out->writable) {

@@ -208,9 +208,24 @@ def sigterm_ends_it_within_two_seconds_in_every_state():
         assert os.access(run.state / "transport.h5", os.R_OK)
 
 
+def sigterm_ends_it_while_work_goes_on_that_cannot_be_interrupted():
+    with exhibit(90, 70, channels=1) as run:  # a scene that takes long to prepare
+        run.start()
+        run.client().close()
+        time.sleep(0.5)
+        if run.status()["state"] != "opening":
+            return "skip: the scene is prepared too fast here"
+        code, seconds = run.stop()
+        assert code == 0 and seconds < 2, (code, seconds)
+        assert not run.socket.exists()
+        assert "cannot be interrupted" in run.said()
+        return None
+
+
 if __name__ == "__main__":
     main([reacquire_keeps_the_picture_and_ends_with_a_newer_transport, other_scopes_are_told_apart,
           a_kill_in_the_middle_loses_nothing, kills_at_any_time_leave_a_whole_transport,
           hold_ends_an_acquisition_and_the_picture_comes_back, a_failing_acquisition_leaves_the_earlier_picture_up,
           a_changed_room_is_measured_again_where_the_configuration_wants_it,
-          sigterm_ends_it_within_two_seconds_in_every_state])
+          sigterm_ends_it_within_two_seconds_in_every_state,
+          sigterm_ends_it_while_work_goes_on_that_cannot_be_interrupted])
