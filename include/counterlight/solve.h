@@ -24,7 +24,8 @@ typedef struct clt_channel_certificate {
   size_t lit, dark;               /* cells that take part, cells that do not */
   double radius_low, radius_high; /* Collatz-Wielandt bounds: radius_low <= rho(R) <= radius_high */
   double norm_high;               /* upper bound of ||R||_2 from sqrt(||R||_1 ||R||_inf) */
-  double reciprocity; /* defect of the flux-scaled S: ||S W - (S W)'|| / ||S W||, off the diagonal, by probes */
+  double reciprocity; /* defect of the flux-scaled S: ||(S W - (S W)') z|| / ||S W z||, the worst of probes z at every
+                         scale */
   double white;       /* median over lit cells of F: the radiance that white means by default */
 } clt_channel_certificate;
 

@@ -30,7 +30,8 @@ typedef struct clt_provenance {
   int64_t acquired;            /* seconds since 1970-01-01 UTC; 0: not known */
   int patterns, frames;        /* patterns projected, camera frames used */
   double seconds;              /* how long the acquisition took */
-  double error;                /* relative RMS of check patterns predicted by T against observed; < 0: not known */
+  double error; /* relative RMS of check patterns, predicted by T against observed, less the observations' noise;
+                   < 0: not known */
 } clt_provenance;
 
 typedef struct clt_transport_info {

@@ -91,7 +91,8 @@ static void draw_check(clt_session *session, unsigned check) {
   }
 }
 
-/* Adds ||b0 + T x - y||^2 and ||y||^2 of the last observation; x and y are workspace of `cells` values each. */
+/* Adds ||b0 + T x - y||^2, less what the noise of y adds to it, and ||y||^2 of the last observation; x and y are
+ * workspace of `cells` values each. */
 static void add_check_error(const clt_session *session, const clt_transport *transport, double *x, double *y,
                             double *wrong, double *seen) {
   size_t cells = session->cells;
@@ -102,9 +103,10 @@ static void add_check_error(const clt_session *session, const clt_transport *tra
     }
     clt_transport_apply(transport, c, x, y);
     for (size_t i = 0; i < cells; i++) {
-      if (isfinite(session->deviation.data[first + i])) {
+      double deviation = session->deviation.data[first + i];
+      if (isfinite(deviation)) {
         double observed = session->seen.data[first + i], predicted = y[i] + session->black.data[first + i];
-        *wrong += (predicted - observed) * (predicted - observed);
+        *wrong += (predicted - observed) * (predicted - observed) - deviation * deviation;
         *seen += observed * observed;
       }
     }
@@ -127,7 +129,7 @@ static clt_status measure_error(clt_session *session, const clt_transport *trans
     }
   }
   free(x);
-  *relative = seen > 0 ? sqrt(wrong / seen) : -1;
+  *relative = seen > 0 ? sqrt(fmax(wrong, 0) / seen) : -1;
   return status;
 }
 

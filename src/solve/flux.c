@@ -16,7 +16,7 @@
 
 static const double FLUX_TOLERANCE = 1e-7;
 static const double LEAST_WEIGHT = 1e-6; /* of the mean: what noise leaves below is not believed */
-enum { FLUX_PRODUCTS = 20, PROBES = 4 };
+enum { FLUX_PRODUCTS = 20 };
 
 typedef struct chain {
   clt_system *system;
@@ -77,33 +77,43 @@ static void normalise(const clt_system *system, double *w) {
   }
 }
 
-static double random_sign(uint64_t *state) {
-  *state = *state * 6364136223846793005u + 1442695040888963407u;
-  return *state >> 63 ? 1 : -1;
+/* A sign for every block of scale x scale cells, the same at every call. */
+static void fill_signs(const clt_system *system, size_t width, size_t scale, double *z) {
+  for (size_t i = 0; i < system->cols; i++) {
+    uint64_t block = ((i / width / scale) << 32) + i % width / scale + 1;
+    z[i] = !system->lit[i] ? 0 : (block * 0x9e3779b97f4a7c15u ^ block * 0xbf58476d1ce4e5b9u >> 7) >> 63 ? 1 : -1;
+  }
 }
 
-/* ||R W - (R W)'||_F / ||R W||_F by random signs z: E ||B z||^2 = ||B||_F^2, (R W)' z = W R' z. */
-static double reciprocity_defect(clt_system *system, const double *w) {
+/* ||(S W - (S W)') z|| / ||S W z|| for signs z over blocks of one scale; (S W)' z = W S' z. */
+static double defect_at(clt_system *system, const double *w, size_t width, size_t scale) {
   double *z = clt_system_vector(system, 0), *forward = clt_system_vector(system, 1);
   double *backward = clt_system_vector(system, 2), *weighted = clt_system_vector(system, 3);
-  double difference = 0, size = 0;
-  uint64_t state = 20100629;
-  for (int probe = 0; probe < PROBES; probe++) {
-    for (size_t i = 0; i < system->cols; i++) {
-      z[i] = system->lit[i] ? random_sign(&state) : 0;
-      weighted[i] = w[i] * z[i];
-    }
-    clt_system_apply(system, weighted, forward);
-    clt_system_apply_transposed(system, z, backward);
-    for (size_t i = 0; i < system->cols; i++) {
-      double ahead = forward[i] - weighted[i], back = w[i] * (backward[i] - z[i]);
-      difference += (ahead - back) * (ahead - back);
-      size += ahead * ahead;
-    }
+  fill_signs(system, width, scale, z);
+  for (size_t i = 0; i < system->cols; i++) {
+    weighted[i] = w[i] * z[i];
   }
-  /* below this share of the diagonal R is rounding of the stored entries: the scene is flat */
-  double floor_size = 1e-12 * PROBES * clt_dot(system->cols, w, w);
-  return size > floor_size ? sqrt(difference / size) : 0;
+  clt_system_apply(system, weighted, forward);
+  clt_system_apply_transposed(system, z, backward);
+  double difference = 0, size = 0;
+  for (size_t i = 0; i < system->cols; i++) {
+    double apart = forward[i] - w[i] * backward[i];
+    difference += apart * apart;
+    size += forward[i] * forward[i];
+  }
+  return size > 0 ? sqrt(difference / size) : 0;
+}
+
+/* Seen at every scale: fine signs see the noise of single entries as a product does, coarse ones what is uneven between
+ * regions, which light that spreads widely hides among many small entries. */
+static double reciprocity_defect(clt_system *system, const double *w) {
+  clt_transport_info info = clt_transport_describe(system->transport);
+  size_t width = (size_t)info.width, side = (size_t)(info.width > info.height ? info.width : info.height);
+  double worst = 0;
+  for (size_t scale = 1; scale < side || scale == 1; scale *= 2) {
+    worst = fmax(worst, defect_at(system, w, width, scale));
+  }
+  return worst;
 }
 
 double clt_flux_weights(clt_system *system, double *w) {

@@ -177,7 +177,7 @@ static void flux_weights_are_recovered(void **state) {
   }
 }
 
-/* The probes' estimate against ||R W - (R W)'|| / ||R W|| in full. */
+/* The probes' estimate lies between the mean and the norm of the skew part, found in full. */
 static void the_reciprocity_defect_is_measured(void **state) {
   (void)state;
   for (uint64_t seed = 1; seed <= 4; seed++) {
@@ -185,7 +185,7 @@ static void the_reciprocity_defect_is_measured(void **state) {
     float *entries = clt_transport_entries(room.transport, 0);
     uint64_t random = seed;
     for (size_t i = 0; i < room.cells * room.cells; i++) {
-      entries[i] *= (float)(1 + .6 * (test_random(&random) - .5));
+      entries[i] *= (float)(i % (room.cells + 1) == 0 ? 1 : 1 + .6 * (test_random(&random) - .5));
     }
     room_certify(&room);
     size_t n;
@@ -193,16 +193,15 @@ static void the_reciprocity_defect_is_measured(void **state) {
     const double *w = clt_certificate_flux(room.certificate, 0);
     for (size_t i = 0; i < n; i++) {
       for (size_t j = 0; j < n; j++) {
-        double entry = r[i * n + j] * w[j], mirrored = r[j * n + i] * w[i];
+        double entry = r[i * n + j] * w[j] + (i == j ? w[i] : 0), mirrored = r[j * n + i] * w[i] + (i == j ? w[i] : 0);
         difference += (entry - mirrored) * (entry - mirrored);
-        size += entry * entry;
+        size += w[i] * w[i] / (double)n;
       }
     }
-    double known = sqrt(difference / size);
-    assert_true(known > .1);
-    /* R W is nearly of rank one, so four probes see its size with an error of about 1 / sqrt(2) of it */
+    double mean = sqrt(difference / size); /* of ||K z|| / ||W z|| over signs z, to which S W z adds little */
     double told = clt_certificate_channel(room.certificate, 0)->reciprocity;
-    assert_true(told > known / 3 && told < known * 3);
+    assert_true(mean > .005);
+    assert_true(told > mean / 3 && told < mean * 3);
     free(r);
     room_free(&room);
   }
@@ -218,7 +217,7 @@ static void a_flat_scene_is_certified(void **state) {
   const clt_channel_certificate *channel = clt_certificate_channel(room.certificate, 0);
   assert_near(channel->radius_high, 0, 1e-12);
   assert_near(channel->norm_high, 0, 1e-12);
-  assert_true(channel->reciprocity == 0);
+  assert_near(channel->reciprocity, 0, 1e-12);
   assert_near(channel->white, 3.0 / 7, 1e-7);
   for (int i = 0; i < 5; i++) {
     assert_near(clt_certificate_flux(room.certificate, 0)[i], 1, 1e-12);
