@@ -6,7 +6,7 @@
 #include "daemon/control.h"
 
 /* Longest time from the wish to stop to the end, s; a solve that cannot be interrupted is left behind then. */
-static const double grace_s = 1.2;
+static const double grace_s = 1.0;
 
 static void order(const control *self, output_order_kind kind) {
   output_order *letter = clt_alloc(1, sizeof *letter);

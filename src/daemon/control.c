@@ -252,6 +252,9 @@ clt_status control_create(const daemon_boxes *boxes, listener *listening, const 
 
 void *control_run(void *data) {
   control *self = data;
+  const char *socket = self->listening->bound ? self->listening->path : "passed by systemd";
+  clt_log(CLT_LOG_NOTICE, "counterlightd %s: configuration %s, control socket %s, state directory %s", CLT_VERSION,
+          self->config.path, socket, self->config.state);
   if (self->notify.watchdog_usec > 0) {
     control_arm(self->watchdog, 0);
   }
