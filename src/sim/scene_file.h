@@ -1,0 +1,18 @@
+/* Reading a scene file in parts: what the parts share. Problems are kept in the section's settings. */
+#ifndef CLT_SIM_SCENE_FILE_H
+#define CLT_SIM_SCENE_FILE_H
+
+#include "base/settings.h"
+#include "sim/description.h"
+
+/* A point or direction `key = [x, y, z]`, m. */
+clt_vector clt_scene_read_vector(clt_section section, const char *key, clt_vector fallback);
+/* One number for every channel, or one per channel; values has room for CLT_SIM_CHANNELS_MAX. */
+void clt_scene_read_channels(clt_section section, const char *key, int channels, double fallback, double low,
+                             double high, double *values);
+/* `materials` and `surfaces`; the description's channels are known. */
+void clt_scene_read_surfaces(clt_section root, clt_scene_description *description);
+/* Refuses a projector whose light meets no front of a surface. */
+void clt_scene_check_lit(clt_section root, const clt_scene_description *description);
+
+#endif
