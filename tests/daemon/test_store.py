@@ -1,5 +1,6 @@
 """What is in the state directory at the start: whole, damaged, of another room, or not writable."""
 import os
+import shutil
 
 import h5py
 import numpy
@@ -93,6 +94,10 @@ def a_state_directory_that_cannot_be_written_is_a_warning():
         run.state.mkdir(mode=0o500)
         if os.getuid() == 0:  # root may write everywhere
             run.folder.chmod(0o777)
+            # the source and build trees may lie where only root may look
+            run.program = shutil.copy(run.program, run.folder)
+            run.content = shutil.copy(run.content, run.folder)
+            run.write_config()
             os.chown(run.state, 65534, 65534)
             options = {"user": 65534, "group": 65534, "extra_groups": []}
         run.start(**options)
