@@ -10,16 +10,11 @@
  * normal; 0 where the point is behind it. */
 double clt_formfactor_point(clt_vector point, clt_vector normal, const clt_vector vertices[4], clt_vector plane_normal);
 
-/* What may stand between two rectangles. */
-typedef struct clt_blockers {
-  const clt_rectangle *rectangles;
-  const int *which;
-  int count;
-} clt_blockers;
-
-/* area(a) times the form factor from a to b, m^2 (so that it is the same from b to a): the point form factor integrated
- * over a by Gauss-Legendre quadrature of an order that grows as they get close. Visibility is judged from each
- * quadrature point to the centre of b. Both are small elements of larger rectangles. */
-double clt_formfactor_exchange(const clt_rectangle *a, const clt_rectangle *b, const clt_blockers *blockers);
+/* area(a) times the form factor from a to b where nothing stands between, m^2 (so that it is the same from b to a).
+ * Each is first cut to what lies in front of the other's plane. Pairs that are close by the double contour integral
+ *   H = 1/(2 pi) sum over edge pairs of (e_a . e_b) integral integral ln r dt ds    (Stokes; Goral et al. 1984, eq.
+ * 15), the inner integral in closed form, the outer by bisected Gauss-Legendre quadrature; others by the point form
+ * factor integrated over a. */
+double clt_formfactor_exchange(const clt_rectangle *a, const clt_rectangle *b);
 
 #endif

@@ -22,6 +22,10 @@ double clt_rectangle_area(const clt_rectangle *rectangle) {
   return vec_length(rectangle->u) * vec_length(rectangle->v);
 }
 
+clt_vector clt_rectangle_centre(const clt_rectangle *rectangle) {
+  return vec_along(rectangle->corner, 0.5, rectangle->u, 0.5, rectangle->v);
+}
+
 /* Where the ray meets the rectangle; false where it does not, or only runs along its plane. */
 static bool meet(const clt_rectangle *rectangle, clt_vector origin, clt_vector direction, clt_hit *hit) {
   double slope = vec_dot(rectangle->normal, direction);

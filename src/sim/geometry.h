@@ -48,6 +48,7 @@ bool clt_rectangle_complete(clt_rectangle *rectangle);
 /* Corner number 0..3 in the order corner, +u, +u+v, +v: counter-clockwise seen from the front. */
 clt_vector clt_rectangle_vertex(const clt_rectangle *rectangle, int number);
 double clt_rectangle_area(const clt_rectangle *rectangle);
+clt_vector clt_rectangle_centre(const clt_rectangle *rectangle);
 
 typedef struct clt_hit {
   int surface;     /* index into the rectangles; -1: nothing was met */

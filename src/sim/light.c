@@ -5,59 +5,7 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "sim/formfactor.h"
-
-/* Of each pair of surfaces: whether they exchange light, and what may stand between. */
-typedef struct sight {
-  bool facing;
-  clt_blockers blockers;
-  int which[CLT_SURFACES_MAX];
-} sight;
-
-static void find_sights(const clt_scene_description *description, sight *sights) {
-  int count = description->surface_count;
-  for (int a = 0; a < count; a++) {
-    for (int b = 0; b < count; b++) {
-      sight *of = &sights[a * count + b];
-      of->facing = a != b && clt_rectangles_face(&description->surfaces[a], &description->surfaces[b]);
-      int blockers = of->facing ? clt_possible_blockers(description->surfaces, count, a, b, of->which) : 0;
-      of->blockers = (clt_blockers){description->surfaces, of->which, blockers};
-    }
-  }
-}
-
-static void compute_exchange(clt_light *light, const sight *sights) {
-  const clt_mesh *mesh = &light->mesh;
-  int surfaces = light->description->surface_count;
-#pragma omp parallel for schedule(dynamic, 16)
-  for (int j = mesh->count - 1; j >= 0; j--) {
-    double *column = &light->exchange[(size_t)j * (size_t)mesh->count];
-    for (int i = 0; i < j; i++) {
-      const sight *of = &sights[mesh->surface[i] * surfaces + mesh->surface[j]];
-      column[i] = of->facing ? clt_formfactor_exchange(&mesh->elements[i], &mesh->elements[j], &of->blockers) : 0.0;
-    }
-  }
-}
-
-/* Quadrature may carry the row sums of G a little above 1 in a closed room: scales H so that none is. sums: count
- * values. */
-static void limit_row_sums(clt_light *light, double *sums) {
-  const clt_mesh *mesh = &light->mesh;
-  size_t count = (size_t)mesh->count;
-  for (size_t j = 0; j < count; j++) {
-    for (size_t i = 0; i < j; i++) {
-      sums[i] += light->exchange[j * count + i];
-      sums[j] += light->exchange[j * count + i];
-    }
-  }
-  double most = 1.0;
-  for (size_t i = 0; i < count; i++) {
-    most = fmax(most, sums[i] / clt_rectangle_area(&mesh->elements[i]));
-  }
-  for (size_t k = 0; k < count * count && most > 1.0; k++) {
-    light->exchange[k] /= most;
-  }
-}
+#include "sim/exchange.h"
 
 clt_status clt_light_init(clt_light *light, const clt_scene_description *description, clt_error *error) {
   light->description = description;
@@ -66,22 +14,15 @@ clt_status clt_light_init(clt_light *light, const clt_scene_description *descrip
   if (status != CLT_OK) {
     return status;
   }
-  size_t count = (size_t)light->mesh.count, lit = (size_t)light->mesh.lit,
-         surfaces = (size_t)description->surface_count;
+  const clt_mesh *mesh = &light->mesh;
+  size_t count = (size_t)mesh->count, lit = (size_t)mesh->lit;
   light->exchange = clt_alloc(count * count, sizeof *light->exchange);
   light->bounced = clt_alloc(lit * lit, sizeof *light->bounced);
-  sight *sights = clt_alloc(surfaces * surfaces, sizeof *sights);
-  double *sums = clt_alloc(count, sizeof *sums);
-  if (!light->exchange || !light->bounced || !sights || !sums) {
-    status = clt_fail(error, CLT_FAILED, "%s: out of memory for %zu surface elements", description->path, count);
-  } else {
-    find_sights(description, sights);
-    compute_exchange(light, sights);
-    limit_row_sums(light, sums);
+  if (!light->exchange || !light->bounced) {
+    return clt_fail(error, CLT_FAILED, "%s: out of memory for %zu surface elements", description->path, count);
   }
-  free(sights);
-  free(sums);
-  return status;
+  clt_parts parts = {description->surfaces, mesh->elements, mesh->surface, description->surface_count, mesh->count};
+  return clt_exchange_compute(&parts, light->exchange, error);
 }
 
 void clt_light_finish(clt_light *light) {

@@ -1,0 +1,181 @@
+#include "sim/exchange.h"
+
+#include <stdlib.h>
+
+#include "base/memory.h"
+#include "sim/formfactor.h"
+
+/* Of each pair of surfaces: whether they exchange light, and what may stand between. */
+typedef struct sight {
+  bool facing;
+  int blockers, *which;
+} sight;
+
+static void find_sights(const clt_parts *parts, sight *sights, int *which) {
+  int count = parts->surface_count;
+  for (int a = 0; a < count; a++) {
+    for (int b = 0; b < count; b++) {
+      sight *of = &sights[a * count + b];
+      of->facing = a != b && clt_rectangles_face(&parts->surfaces[a], &parts->surfaces[b]);
+      of->which = &which[(size_t)(a * count + b) * (size_t)count];
+      of->blockers = of->facing ? clt_possible_blockers(parts->surfaces, count, a, b, of->which) : 0;
+    }
+  }
+}
+
+static double fraction(double x) {
+  return x - floor(x);
+}
+
+/* The fraction of segments from a to b that nothing cuts, between points of a set that covers both evenly (Roberts' R4
+ * sequence), begun elsewhere for every pair so that the pairs' errors do not add up. */
+static double visible_fraction(const clt_parts *parts, const sight *of, int i, int j) {
+  enum { SEGMENTS = 16 };
+  const double step[4] = {0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101};
+  const clt_rectangle *a = &parts->elements[i], *b = &parts->elements[j];
+  double begin = fraction(0.7548776662466927 * i + 0.5698402909980532 * j);
+  int open = 0;
+  for (int k = 0; k < SEGMENTS; k++) {
+    double at[4];
+    for (int d = 0; d < 4; d++) {
+      at[d] = fraction((d + 1) * begin + k * step[d]);
+    }
+    clt_vector from = vec_along(a->corner, at[0], a->u, at[1], a->v);
+    clt_vector to = vec_along(b->corner, at[2], b->u, at[3], b->v);
+    open += !clt_segment_blocked(parts->surfaces, of->which, of->blockers, from, to);
+  }
+  return open / (double)SEGMENTS;
+}
+
+static void fill(const clt_parts *parts, const sight *sights, double *exchange) {
+#pragma omp parallel for schedule(dynamic, 16)
+  for (int j = parts->count - 1; j >= 0; j--) {
+    double *column = &exchange[(size_t)j * (size_t)parts->count];
+    for (int i = 0; i < j; i++) {
+      const clt_rectangle *a = &parts->elements[i], *b = &parts->elements[j];
+      const sight *of = &sights[parts->surface[i] * parts->surface_count + parts->surface[j]];
+      double visible = !of->facing ? 0.0 : of->blockers > 0 ? visible_fraction(parts, of, i, j) : 1.0;
+      column[i] = visible > 0.0 ? visible * clt_formfactor_exchange(a, b) : 0.0;
+    }
+  }
+}
+
+/* Direction number `number` of a cosine-distributed set (Hammersley points), turned by `turn` of a full circle. */
+static clt_vector hemisphere(const clt_rectangle *of, int number, int count, double turn) {
+  double reversed = 0.0, digit = 0.5;
+  for (int bits = number; bits > 0; bits >>= 1, digit *= 0.5) {
+    reversed += digit * (bits & 1);
+  }
+  double squared = (number + 0.5) / count, angle = 2.0 * M_PI * (reversed + turn), radius = sqrt(squared);
+  clt_vector across =
+      vec_along(vec_scale(sqrt(1.0 - squared), of->normal), radius * cos(angle), vec_unit(of->u), 0.0, of->u);
+  return vec_along(across, radius * sin(angle), vec_cross(of->normal, vec_unit(of->u)), 0.0, of->u);
+}
+
+/* True where rays from the middle of every element meet fronts only. Asks one ray of each element before the next, so
+ * that an open room is known at once. */
+static bool room_is_closed(const clt_parts *parts) {
+  enum { RAYS = 64 };
+  const double golden = 0.6180339887498949;
+  for (int ray = 0; ray < RAYS; ray++) {
+    for (int k = 0; k < parts->count; k++) {
+      const clt_rectangle *element = &parts->elements[k];
+      clt_vector direction = hemisphere(element, ray, RAYS, golden * k);
+      if (!clt_first_hit(parts->surfaces, parts->surface_count, clt_rectangle_centre(element), direction).front) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+/* sums_i = scale_i (H scale)_i: the row sums of X H X. */
+static void scaled_sums(const double *exchange, int count, const double *scale, double *sums) {
+  for (int j = 0; j < count; j++) {
+    sums[j] = 0.0;
+  }
+  for (int j = 0; j < count; j++) {
+    const double *column = &exchange[(size_t)j * (size_t)count];
+    double sum = 0.0;
+    for (int i = 0; i < j; i++) {
+      sum += column[i] * scale[i];
+      sums[i] += column[i] * scale[j];
+    }
+    sums[j] += sum;
+  }
+  for (int j = 0; j < count; j++) {
+    sums[j] *= scale[j];
+  }
+}
+
+/* In an open room some light leaves: a row is only kept from sending more than all. X_i = min(1, area_i / sum_i) does
+ * that in one pass, since every X_j <= 1. */
+static void limit(const clt_parts *parts, const double *sums, double *scale) {
+  for (int i = 0; i < parts->count; i++) {
+    scale[i] = fmin(1.0, clt_rectangle_area(&parts->elements[i]) / sums[i]);
+  }
+}
+
+/* In a closed room every row sum is known to be the area exactly, and what H misses is the error of quadrature and of
+ * sampled visibility. X H X with a positive diagonal X that has those sums is unique where it exists (Sinkhorn and
+ * Knopp 1967): it keeps H symmetric, so reciprocity holds to the last digit, keeps zeros where nothing is exchanged,
+ * and moves H by no more than that error. sums comes as the row sums of H. */
+static void conserve(const clt_parts *parts, const double *exchange, double *sums, double *scale) {
+  enum { SWEEPS_MAX = 500 };
+  double off = 1.0;
+  for (int sweep = 0; sweep < SWEEPS_MAX && off > 1e-13; sweep++) {
+    off = 0.0;
+    for (int i = 0; i < parts->count; i++) {
+      double wanted = clt_rectangle_area(&parts->elements[i]);
+      if (sums[i] > 0.0) {
+        scale[i] *= sqrt(wanted / sums[i]);
+        off = fmax(off, fabs(sums[i] / wanted - 1.0));
+      }
+    }
+    scaled_sums(exchange, parts->count, scale, sums);
+  }
+}
+
+/* scale, sums: count values each. */
+static void balance(const clt_parts *parts, double *exchange, double *scale, double *sums) {
+  for (int i = 0; i < parts->count; i++) {
+    scale[i] = 1.0;
+  }
+  scaled_sums(exchange, parts->count, scale, sums);
+  if (room_is_closed(parts)) {
+    conserve(parts, exchange, sums, scale);
+  } else {
+    limit(parts, sums, scale);
+  }
+#pragma omp parallel for schedule(dynamic, 16)
+  for (int j = 0; j < parts->count; j++) {
+    double *column = &exchange[(size_t)j * (size_t)parts->count];
+    for (int i = 0; i < j; i++) {
+      column[i] *= scale[i] * scale[j];
+    }
+  }
+}
+
+clt_status clt_exchange_compute(const clt_parts *parts, double *exchange, clt_error *error) {
+  size_t count = (size_t)parts->count, surfaces = (size_t)parts->surface_count;
+  sight *sights = clt_alloc(surfaces * surfaces, sizeof *sights);
+  int *which = clt_alloc(surfaces * surfaces * surfaces, sizeof *which);
+  double *sums = clt_alloc(2 * count, sizeof *sums);
+  clt_status status = CLT_OK;
+  if (!sights || !which || !sums) {
+    status = clt_fail(error, CLT_FAILED, "out of memory for the exchange of light between %zu elements", count);
+  } else {
+    find_sights(parts, sights, which);
+    fill(parts, sights, exchange);
+    balance(parts, exchange, sums, sums + count);
+  }
+  free(sights);
+  free(which);
+  free(sums);
+  return status;
+}
+
+double clt_exchange_between(const double *exchange, int count, int i, int j) {
+  int row = i < j ? i : j, column = i < j ? j : i;
+  return i == j ? 0.0 : exchange[(size_t)column * (size_t)count + (size_t)row];
+}
