@@ -5,20 +5,23 @@
 #include "base/memory.h"
 #include "sim/formfactor.h"
 
-/* Of each pair of surfaces: whether they exchange light, and what may stand between. */
-typedef struct sight {
-  bool facing;
-  int blockers, *which;
-} sight;
+/* What may pass between a pair of surfaces. */
+enum sight { HIDDEN, OPEN, PERHAPS_PARTED };
 
-static void find_sights(const clt_parts *parts, sight *sights, int *which) {
+/* Looking for what could part each pair takes surfaces^3 steps; so many surfaces do part some, and rays tell. */
+enum { CULLED_MAX = 256 };
+
+static void find_sights(const clt_parts *parts, unsigned char *sights) {
   int count = parts->surface_count;
+#pragma omp parallel for schedule(dynamic)
   for (int a = 0; a < count; a++) {
     for (int b = 0; b < count; b++) {
-      sight *of = &sights[a * count + b];
-      of->facing = a != b && clt_rectangles_face(&parts->surfaces[a], &parts->surfaces[b]);
-      of->which = &which[(size_t)(a * count + b) * (size_t)count];
-      of->blockers = of->facing ? clt_possible_blockers(parts->surfaces, count, a, b, of->which) : 0;
+      enum sight found = HIDDEN;
+      if (a != b && clt_rectangles_face(&parts->surfaces[a], &parts->surfaces[b])) {
+        bool parted = count > CULLED_MAX || clt_rectangles_may_be_parted(parts->surfaces, count, a, b);
+        found = parted ? PERHAPS_PARTED : OPEN;
+      }
+      sights[(size_t)a * (size_t)count + (size_t)b] = (unsigned char)found;
     }
   }
 }
@@ -29,7 +32,7 @@ static double fraction(double x) {
 
 /* The fraction of segments from a to b that nothing cuts, between points of a set that covers both evenly (Roberts' R4
  * sequence), begun elsewhere for every pair so that the pairs' errors do not add up. */
-static double visible_fraction(const clt_parts *parts, const sight *of, int i, int j) {
+static double visible_fraction(const clt_parts *parts, int i, int j) {
   enum { SEGMENTS = 16 };
   const double step[4] = {0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101};
   const clt_rectangle *a = &parts->elements[i], *b = &parts->elements[j];
@@ -42,19 +45,19 @@ static double visible_fraction(const clt_parts *parts, const sight *of, int i, i
     }
     clt_vector from = vec_along(a->corner, at[0], a->u, at[1], a->v);
     clt_vector to = vec_along(b->corner, at[2], b->u, at[3], b->v);
-    open += !clt_segment_blocked(parts->surfaces, of->which, of->blockers, from, to);
+    open += !clt_visibility_blocked(parts->visibility, from, to, parts->surface[i], parts->surface[j]);
   }
   return open / (double)SEGMENTS;
 }
 
-static void fill(const clt_parts *parts, const sight *sights, double *exchange) {
+static void fill(const clt_parts *parts, const unsigned char *sights, double *exchange) {
 #pragma omp parallel for schedule(dynamic, 16)
   for (int j = parts->count - 1; j >= 0; j--) {
     double *column = &exchange[(size_t)j * (size_t)parts->count];
     for (int i = 0; i < j; i++) {
       const clt_rectangle *a = &parts->elements[i], *b = &parts->elements[j];
-      const sight *of = &sights[parts->surface[i] * parts->surface_count + parts->surface[j]];
-      double visible = !of->facing ? 0.0 : of->blockers > 0 ? visible_fraction(parts, of, i, j) : 1.0;
+      size_t pair = (size_t)parts->surface[i] * (size_t)parts->surface_count + (size_t)parts->surface[j];
+      double visible = sights[pair] == HIDDEN ? 0.0 : sights[pair] == OPEN ? 1.0 : visible_fraction(parts, i, j);
       column[i] = visible > 0.0 ? visible * clt_formfactor_exchange(a, b) : 0.0;
     }
   }
@@ -81,7 +84,8 @@ static bool room_is_closed(const clt_parts *parts) {
     for (int k = 0; k < parts->count; k++) {
       const clt_rectangle *element = &parts->elements[k];
       clt_vector direction = hemisphere(element, ray, RAYS, golden * k);
-      if (!clt_first_hit(parts->surfaces, parts->surface_count, clt_rectangle_centre(element), direction).front) {
+      clt_vector from = clt_rectangle_centre(element);
+      if (!clt_visibility_first_hit(parts->visibility, from, direction, parts->surface[k]).front) {
         return false;
       }
     }
@@ -158,19 +162,17 @@ static void balance(const clt_parts *parts, double *exchange, double *scale, dou
 
 clt_status clt_exchange_compute(const clt_parts *parts, double *exchange, clt_error *error) {
   size_t count = (size_t)parts->count, surfaces = (size_t)parts->surface_count;
-  sight *sights = clt_alloc(surfaces * surfaces, sizeof *sights);
-  int *which = clt_alloc(surfaces * surfaces * surfaces, sizeof *which);
+  unsigned char *sights = clt_alloc(surfaces * surfaces, 1);
   double *sums = clt_alloc(2 * count, sizeof *sums);
   clt_status status = CLT_OK;
-  if (!sights || !which || !sums) {
+  if (!sights || !sums) {
     status = clt_fail(error, CLT_FAILED, "out of memory for the exchange of light between %zu elements", count);
   } else {
-    find_sights(parts, sights, which);
+    find_sights(parts, sights);
     fill(parts, sights, exchange);
     balance(parts, exchange, sums, sums + count);
   }
   free(sights);
-  free(which);
   free(sums);
   return status;
 }

@@ -3,13 +3,14 @@
 #define CLT_SIM_EXCHANGE_H
 
 #include "counterlight/status.h"
-#include "sim/geometry.h"
+#include "sim/visibility.h"
 
 /* Elements, and the surfaces that they are parts of; nothing here is owned. */
 typedef struct clt_parts {
   const clt_rectangle *surfaces, *elements;
   const int *surface; /* of each element */
   int surface_count, count;
+  const clt_visibility *visibility; /* of the surfaces */
 } clt_parts;
 
 /* H: area_i times the form factor from element i to j, m^2, so that H_ij = H_ji. exchange: count^2 values,

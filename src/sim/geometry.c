@@ -26,36 +26,42 @@ clt_vector clt_rectangle_centre(const clt_rectangle *rectangle) {
   return vec_along(rectangle->corner, 0.5, rectangle->u, 0.5, rectangle->v);
 }
 
-/* Where the ray meets the rectangle; false where it does not, or only runs along its plane. */
-static bool meet(const clt_rectangle *rectangle, clt_vector origin, clt_vector direction, clt_hit *hit) {
+clt_hit clt_hit_on_plane(const clt_rectangle *rectangle, clt_vector origin, clt_vector direction) {
   double slope = vec_dot(rectangle->normal, direction);
-  if (slope == 0.0) {
-    return false;
-  }
-  hit->distance = vec_dot(rectangle->normal, vec_sub(rectangle->corner, origin)) / slope;
-  clt_vector at = vec_sub(vec_add(origin, vec_scale(hit->distance, direction)), rectangle->corner);
-  hit->s = vec_dot(at, rectangle->u) / vec_dot(rectangle->u, rectangle->u);
-  hit->t = vec_dot(at, rectangle->v) / vec_dot(rectangle->v, rectangle->v);
-  hit->front = slope < 0.0;
-  return hit->distance > TOUCHING && hit->s >= 0.0 && hit->s <= 1.0 && hit->t >= 0.0 && hit->t <= 1.0;
+  clt_hit hit = {.front = slope < 0.0};
+  hit.distance = vec_dot(rectangle->normal, vec_sub(rectangle->corner, origin)) / slope;
+  clt_vector at = vec_sub(vec_add(origin, vec_scale(hit.distance, direction)), rectangle->corner);
+  hit.s = vec_dot(at, rectangle->u) / vec_dot(rectangle->u, rectangle->u);
+  hit.t = vec_dot(at, rectangle->v) / vec_dot(rectangle->v, rectangle->v);
+  return hit;
 }
 
-clt_hit clt_first_hit(const clt_rectangle *rectangles, int count, clt_vector origin, clt_vector direction) {
+/* Where the ray meets the rectangle; false where it does not, or only runs along its plane (distance and places are
+ * then not finite). */
+static bool meet(const clt_rectangle *rectangle, clt_vector origin, clt_vector direction, clt_hit *hit) {
+  *hit = clt_hit_on_plane(rectangle, origin, direction);
+  return isfinite(hit->distance) && hit->distance > TOUCHING && hit->s >= 0.0 && hit->s <= 1.0 && hit->t >= 0.0 &&
+         hit->t <= 1.0;
+}
+
+clt_hit clt_first_hit(const clt_rectangle *rectangles, int count, clt_vector origin, clt_vector direction,
+                      int leaving) {
   clt_hit first = {.surface = -1, .distance = INFINITY};
   for (int k = 0; k < count; k++) {
-    clt_hit hit = {.surface = k};
-    if (meet(&rectangles[k], origin, direction, &hit) && hit.distance < first.distance) {
+    clt_hit hit;
+    if (k != leaving && meet(&rectangles[k], origin, direction, &hit) && hit.distance < first.distance) {
       first = hit;
+      first.surface = k;
     }
   }
   return first;
 }
 
-bool clt_segment_blocked(const clt_rectangle *rectangles, const int *which, int count, clt_vector from, clt_vector to) {
+bool clt_segment_blocked(const clt_rectangle *rectangles, int count, clt_vector from, clt_vector to, int a, int b) {
   clt_vector direction = vec_sub(to, from);
   for (int k = 0; k < count; k++) {
     clt_hit hit;
-    if (meet(&rectangles[which[k]], from, direction, &hit) && hit.distance < 1.0 - TOUCHING) {
+    if (k != a && k != b && meet(&rectangles[k], from, direction, &hit) && hit.distance < 1.0 - TOUCHING) {
       return true;
     }
   }
@@ -73,14 +79,13 @@ static int sides(const clt_rectangle *plane, const clt_rectangle *of) {
   return found;
 }
 
-int clt_possible_blockers(const clt_rectangle *rectangles, int count, int a, int b, int *which) {
-  int found = 0;
+bool clt_rectangles_may_be_parted(const clt_rectangle *rectangles, int count, int a, int b) {
   for (int k = 0; k < count; k++) {
     if (k != a && k != b && (sides(&rectangles[k], &rectangles[a]) | sides(&rectangles[k], &rectangles[b])) == 3) {
-      which[found++] = k;
+      return true;
     }
   }
-  return found;
+  return false;
 }
 
 bool clt_rectangles_face(const clt_rectangle *a, const clt_rectangle *b) {

@@ -57,15 +57,18 @@ typedef struct clt_hit {
   double s, t;     /* where on the rectangle */
 } clt_hit;
 
-/* The first rectangle that origin + distance * direction meets at distance > 0. */
-clt_hit clt_first_hit(const clt_rectangle *rectangles, int count, clt_vector origin, clt_vector direction);
+/* Where the ray meets the rectangle's plane, also outside of the rectangle or behind the origin. */
+clt_hit clt_hit_on_plane(const clt_rectangle *rectangle, clt_vector origin, clt_vector direction);
 
-/* True where one of the rectangles numbered which[0..count-1] cuts the open segment between two points. */
-bool clt_segment_blocked(const clt_rectangle *rectangles, const int *which, int count, clt_vector from, clt_vector to);
+/* The first rectangle but number `leaving` that origin + distance * direction meets at distance > 0. */
+clt_hit clt_first_hit(const clt_rectangle *rectangles, int count, clt_vector origin, clt_vector direction, int leaving);
 
-/* The rectangles that could stand between points of rectangles a and b: those whose plane has corners of a or b well on
- * both sides. which has room for count; returns how many. */
-int clt_possible_blockers(const clt_rectangle *rectangles, int count, int a, int b, int *which);
+/* True where one of the rectangles but those numbered a and b cuts the open segment between two points. */
+bool clt_segment_blocked(const clt_rectangle *rectangles, int count, clt_vector from, clt_vector to, int a, int b);
+
+/* True where some rectangle could stand between points of rectangles a and b: one whose plane has corners of a or b
+ * well on both sides. */
+bool clt_rectangles_may_be_parted(const clt_rectangle *rectangles, int count, int a, int b);
 
 /* True where some point in front of a sees some point in front of b. */
 bool clt_rectangles_face(const clt_rectangle *a, const clt_rectangle *b);

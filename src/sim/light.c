@@ -10,7 +10,11 @@
 clt_status clt_light_init(clt_light *light, const clt_scene_description *description, clt_error *error) {
   light->description = description;
   light->solved = -1;
-  clt_status status = clt_mesh_init(&light->mesh, description, error);
+  clt_status status =
+      clt_visibility_create(description->surfaces, description->surface_count, &light->visibility, error);
+  if (status == CLT_OK) {
+    status = clt_mesh_init(&light->mesh, description, light->visibility, error);
+  }
   if (status != CLT_OK) {
     return status;
   }
@@ -21,12 +25,14 @@ clt_status clt_light_init(clt_light *light, const clt_scene_description *descrip
   if (!light->exchange || !light->bounced) {
     return clt_fail(error, CLT_FAILED, "%s: out of memory for %zu surface elements", description->path, count);
   }
-  clt_parts parts = {description->surfaces, mesh->elements, mesh->surface, description->surface_count, mesh->count};
+  clt_parts parts = {description->surfaces,      mesh->elements, mesh->surface,
+                     description->surface_count, mesh->count,    light->visibility};
   return clt_exchange_compute(&parts, light->exchange, error);
 }
 
 void clt_light_finish(clt_light *light) {
   clt_mesh_finish(&light->mesh);
+  clt_visibility_destroy(light->visibility);
   free(light->exchange);
   free(light->bounced);
   *light = (clt_light){.solved = -1};

@@ -13,6 +13,7 @@
 
 typedef struct clt_light {
   const clt_scene_description *description; /* outlives the light */
+  clt_visibility *visibility;
   clt_mesh mesh;
   /* mesh.count^2 values, column-major: H above the diagonal (row < column), the factor's work area on and below it. */
   double *exchange;

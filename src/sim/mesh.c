@@ -10,7 +10,7 @@ typedef struct division {
   int columns, rows, first;
 } division;
 
-static void trace(clt_mesh *mesh, const clt_scene_description *description) {
+static void trace(clt_mesh *mesh, const clt_scene_description *description, const clt_visibility *visibility) {
   clt_vector from = description->projector.pinhole.position;
 #pragma omp parallel for schedule(static)
   for (int cell = 0; cell < mesh->cells; cell++) {
@@ -18,7 +18,7 @@ static void trace(clt_mesh *mesh, const clt_scene_description *description) {
     double total = 0.0;
     for (int ray = 0; ray < mesh->rays; ray++) {
       clt_vector direction = clt_scene_ray(description, cell, ray, &ends[ray].share);
-      clt_hit hit = clt_first_hit(description->surfaces, description->surface_count, from, direction);
+      clt_hit hit = clt_visibility_first_hit(visibility, from, direction, -1);
       total += ends[ray].share;
       ends[ray].surface = hit.front ? hit.surface : -1;
       if (ends[ray].surface >= 0) {
@@ -89,7 +89,8 @@ static int choose_division(const clt_scene_description *description, double foot
 }
 
 static int element_at(const division *of, double s, double t) {
-  int column = (int)fmin(s * of->columns, of->columns - 1), row = (int)fmin(t * of->rows, of->rows - 1);
+  int column = (int)fmin(fmax(s, 0.0) * of->columns, of->columns - 1);
+  int row = (int)fmin(fmax(t, 0.0) * of->rows, of->rows - 1);
   return of->first + row * of->columns + column;
 }
 
@@ -159,7 +160,8 @@ static clt_status out_of_memory(const clt_scene_description *description, clt_er
   return clt_fail(error, CLT_FAILED, "%s: out of memory for the light's mesh; use a smaller grid", description->path);
 }
 
-clt_status clt_mesh_init(clt_mesh *mesh, const clt_scene_description *description, clt_error *error) {
+clt_status clt_mesh_init(clt_mesh *mesh, const clt_scene_description *description, const clt_visibility *visibility,
+                         clt_error *error) {
   mesh->cells = description->width * description->height;
   mesh->rays = description->rays * description->rays;
   size_t cells = (size_t)mesh->cells, ends = cells * (size_t)mesh->rays;
@@ -171,7 +173,7 @@ clt_status clt_mesh_init(clt_mesh *mesh, const clt_scene_description *descriptio
   if (!mesh->ends || !mesh->solid_angle || !mesh->start || !mesh->element || !mesh->weight) {
     return out_of_memory(description, error);
   }
-  trace(mesh, description);
+  trace(mesh, description, visibility);
   division divisions[CLT_SURFACES_MAX];
   mesh->count = choose_division(description, median_footprint(mesh, mesh->weight), divisions);
   mesh->elements = clt_alloc((size_t)mesh->count, sizeof *mesh->elements);

@@ -3,6 +3,7 @@
 #define CLT_SIM_MESH_H
 
 #include "sim/description.h"
+#include "sim/visibility.h"
 
 enum { CLT_ELEMENTS_MAX = 4800, CLT_ELEMENTS_WANTED = 1000 };
 
@@ -30,9 +31,10 @@ typedef struct clt_mesh {
 } clt_mesh;
 
 /* Traces the cells and divides the surfaces into elements about as large as the median footprint of a cell, smaller
- * where that gives fewer than CLT_ELEMENTS_WANTED, larger where it gives more than CLT_ELEMENTS_MAX. mesh was zeroed by
- * the caller and is finished by it in either case. */
-clt_status clt_mesh_init(clt_mesh *mesh, const clt_scene_description *description, clt_error *error);
+ * where that gives fewer than CLT_ELEMENTS_WANTED, larger where it gives more than CLT_ELEMENTS_MAX. visibility is of
+ * the description's surfaces. mesh was zeroed by the caller and is finished by it in either case. */
+clt_status clt_mesh_init(clt_mesh *mesh, const clt_scene_description *description, const clt_visibility *visibility,
+                         clt_error *error);
 void clt_mesh_finish(clt_mesh *mesh);
 
 #endif

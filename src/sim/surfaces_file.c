@@ -83,7 +83,7 @@ void clt_scene_check_lit(clt_section root, const clt_scene_description *descript
       double solid_angle;
       clt_vector direction = clt_scene_ray(description, cell, ray, &solid_angle);
       clt_hit hit = clt_first_hit(description->surfaces, description->surface_count,
-                                  description->projector.pinhole.position, direction);
+                                  description->projector.pinhole.position, direction, -1);
       if (hit.surface >= 0 && hit.front) {
         return;
       }

@@ -49,9 +49,12 @@ static void solve_exchange(box *made, int side) {
     part->corner = vec_along(whole->corner, k % side, part->u, k / side % side, part->v);
     made->surface[k] = k / (side * side);
   }
-  clt_parts parts = {made->surfaces, made->elements, made->surface, made->surface_count, made->count};
   clt_error error = {.status = CLT_OK};
+  clt_visibility *visibility = NULL;
+  assert_ok(clt_visibility_create(made->surfaces, made->surface_count, &visibility, &error), error);
+  clt_parts parts = {made->surfaces, made->elements, made->surface, made->surface_count, made->count, visibility};
   assert_ok(clt_exchange_compute(&parts, made->exchange, &error), error);
+  clt_visibility_destroy(visibility);
 }
 
 static void destroy(box *made) {

@@ -138,7 +138,7 @@ static void shipped_scenes(void **state) {
       double solid_angle;
       clt_vector direction = clt_scene_ray(scene, cell, 0, &solid_angle);
       assert_true(
-          clt_first_hit(scene->surfaces, scene->surface_count, scene->projector.pinhole.position, direction).front);
+          clt_first_hit(scene->surfaces, scene->surface_count, scene->projector.pinhole.position, direction, -1).front);
     }
     clt_scene_description_finish(scene);
     free(scene);
