@@ -3,6 +3,9 @@
 #ifndef COUNTERLIGHT_SCENE_H
 #define COUNTERLIGHT_SCENE_H
 
+#include <stdbool.h>
+#include <stddef.h>
+
 #include "counterlight/device.h"
 #include "counterlight/image.h"
 #include "counterlight/rig.h"
@@ -27,9 +30,25 @@ CLT_PUBLIC const clt_transport *clt_scene_transport(const clt_scene *scene);
 /* The rig settings that an installer would have measured on this scene: grid, response curves, exposures, a latency
  * with margin. */
 CLT_PUBLIC void clt_scene_rig_config(const clt_scene *scene, clt_rig_config *config);
-/* The exact radiance of every grid cell under a drive, black included: b0 + T drive. radiance is initialised here. */
+/* The exact radiance of every grid cell under a steady drive, black included: b0 + T drive, with what the scene does to
+ * the drive before (crosstalk, defocus) and to the radiance after it (subsurface). What changes with time and what the
+ * camera does is left out. radiance is initialised here. */
 CLT_PUBLIC clt_status clt_scene_appearance(const clt_scene *scene, const clt_image *drive, clt_image *radiance,
                                            clt_error *error);
+
+enum { CLT_EFFECTS = 22, CLT_EFFECT_WHY_MAX = 160 };
+/* What the simulation does about one effect in one scene. */
+typedef struct clt_effect_report {
+  const char *name;             /* "interreflection", "noise", ...: docs/simulator.md lists them */
+  bool on;                      /* the scene calls for it */
+  char why[CLT_EFFECT_WHY_MAX]; /* or why not, in words */
+  double prepare_ms;            /* that opening the scene took for it */
+  double frame_ms;              /* that it takes of a frame (of a new pattern, for what happens to light), measured */
+  size_t bytes;                 /* of memory that it holds */
+} clt_effect_report;
+/* Every effect that a scene may call for, in the order in which light meets them; one that is off costs nothing. Runs
+ * each a few times to measure it: call it while no device of the scene is in use. */
+CLT_PUBLIC clt_status clt_scene_effects(clt_scene *scene, clt_effect_report reports[CLT_EFFECTS], clt_error *error);
 
 /* The scene's projector and camera. One of each may be open at a time; both live in the scene's simulated time, which
  * moves on only when one of them is asked for something. The same seed gives the same frames. */

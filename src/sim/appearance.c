@@ -50,13 +50,19 @@ clt_status clt_appearance_init(clt_appearance *appearance, const clt_transport *
   return enough ? CLT_OK : clt_fail(error, CLT_FAILED, "out of memory for a scene of %zu cells", cells);
 }
 
+/* Whether a channel before c holds the same columns. */
+static bool shares_columns(const clt_appearance *appearance, int c) {
+  for (int k = 0; k < c; k++) {
+    if (appearance->columns[k] == appearance->columns[c]) {
+      return true;
+    }
+  }
+  return false;
+}
+
 void clt_appearance_finish(clt_appearance *appearance) {
   for (int c = 0; c < appearance->channels; c++) {
-    bool shared = false;
-    for (int k = 0; k < c; k++) {
-      shared = shared || appearance->columns[k] == appearance->columns[c];
-    }
-    if (!shared) {
+    if (!shares_columns(appearance, c)) {
       free(appearance->columns[c]);
     }
   }
@@ -64,6 +70,17 @@ void clt_appearance_finish(clt_appearance *appearance) {
   free(appearance->drive);
   free(appearance->seen);
   *appearance = (clt_appearance){0};
+}
+
+size_t clt_appearance_bytes(const clt_appearance *appearance) {
+  size_t bytes =
+      appearance->cells * (sizeof *appearance->driven + sizeof *appearance->drive + sizeof *appearance->seen);
+  for (int c = 0; c < appearance->channels; c++) {
+    if (appearance->columns[c] != NULL && !shares_columns(appearance, c)) {
+      bytes += appearance->cells * appearance->cells * sizeof *appearance->columns[c];
+    }
+  }
+  return bytes;
 }
 
 /* seen += T drive over the driven cells. Threads share out the rows, so that each row's sum has one order. */

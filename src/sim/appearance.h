@@ -20,6 +20,9 @@ typedef struct clt_appearance {
 clt_status clt_appearance_init(clt_appearance *appearance, const clt_transport *transport, clt_error *error);
 void clt_appearance_finish(clt_appearance *appearance);
 
+/* Memory that it holds. */
+size_t clt_appearance_bytes(const clt_appearance *appearance);
+
 /* radiance = b0 + T drive, channels * cells values each; a drive cell at 0 costs nothing. The same for any number of
  * threads. One call at a time. */
 void clt_appearance_of(clt_appearance *appearance, const float *drive, float *radiance);

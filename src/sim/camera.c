@@ -8,17 +8,20 @@
 
 /* Samples of a frame that one thread forms sooner than several have met on a busy machine. */
 enum { FEW_SAMPLES = 1 << 16 };
+/* Pixels that are taken through the stages of the sensor together. */
+enum { RUN = 256 };
 
 typedef struct simulated_camera {
   clt_camera base;
   clt_scene *scene;
   clt_shutter shutter;
   int width, height; /* of a frame */
-  size_t values;     /* channels * cells */
-  /* Per value: mean radiance over the exposure, mean electrons, exp(-electrons). */
-  float *radiance;
-  double *electrons, *none;
+  int bands;
+  clt_band *band; /* one, or one for each row of pixels */
+  clt_exposure exposure;
+  clt_signal signal; /* its radiance is the exposure's where no effect tells the pixels of a cell apart */
   uint16_t *samples;
+  bool delivered; /* samples hold a frame */
 } simulated_camera;
 
 static void describe(const clt_camera *camera, clt_camera_info *info) {
@@ -49,55 +52,97 @@ static clt_status set_exposure(clt_camera *camera, double seconds, clt_error *er
   return CLT_OK;
 }
 
-/* Electrons of a fully exposed pixel are full_well; a negative radiance (of a measured transport) frees none. */
-static void expect_electrons(simulated_camera *self, double exposure_s) {
-  const clt_camera_description *sensor = &self->scene->description.camera;
-  double gain = self->scene->responsivity * exposure_s * sensor->full_well;
-  for (size_t k = 0; k < self->values; k++) {
-    self->electrons[k] = fmax(0.0, gain * (double)self->radiance[k]);
-    self->none[k] = exp(-self->electrons[k]);
-  }
-}
-
-/* One sample: saturation, response curve (odd below zero, where noise may carry the signal), pedestal, quantisation. */
-static uint16_t digitise(const clt_camera_description *sensor, double electrons) {
-  double full = (1 << sensor->bits) - 1, signal = fmin(electrons / sensor->full_well, 1.0);
-  if (sensor->response.kind != CLT_CURVE_LINEAR) {
-    signal = copysign(clt_curve_encode(&sensor->response, fabs(signal)), signal);
-  }
-  double value = rint(sensor->black_level + signal * (full - sensor->black_level));
-  return (uint16_t)fmin(fmax(value, 0.0), full);
-}
-
-static void form_samples(simulated_camera *self, uint32_t sequence) {
-  const clt_scene_description *description = &self->scene->description;
-  const clt_camera_description *sensor = &description->camera;
-  uint64_t key = clt_noise_key(description->seed, sequence);
-  int channels = description->channels, pixels = sensor->cell_pixels;
-  size_t cells = self->values / (size_t)channels;
-#pragma omp parallel for schedule(static) if (self->width * self->height * channels > FEW_SAMPLES)
-  for (int y = 0; y < self->height; y++) {
-    size_t sample = (size_t)y * (size_t)self->width * (size_t)channels;
-    for (int x = 0; x < self->width; x++) {
-      size_t cell = (size_t)(y / pixels) * (size_t)description->width + (size_t)(x / pixels);
-      for (int c = 0; c < channels; c++, sample++) {
-        size_t from = (size_t)c * cells + cell;
-        double electrons =
-            clt_noise_electrons(key, sample, self->electrons[from], self->none[from], sensor->read_noise);
-        self->samples[sample] = digitise(sensor, electrons);
-      }
+/* The exposure, for every pixel of a cell. */
+static void spread_over_pixels(simulated_camera *self) {
+  const clt_exposure *from = &self->exposure;
+  clt_signal *to = &self->signal;
+  int across = to->width / from->width, down = to->height / from->height;
+  for (int k = 0; k < to->channels * to->height; k++) {
+    const float *cells = &from->radiance[(size_t)(k / down) * (size_t)from->width];
+    float *pixels = &to->radiance[(size_t)k * (size_t)to->width];
+    for (int x = 0; x < to->width; x++) {
+      pixels[x] = cells[x / across];
     }
   }
 }
 
+/* Electrons of a fully exposed pixel are full_well; a negative radiance (of a measured transport) frees none. */
+static void expect_electrons(simulated_camera *self, double exposure_s) {
+  const clt_camera_description *sensor = &self->scene->description.camera;
+  clt_signal *signal = &self->signal;
+  double gain = self->scene->responsivity * exposure_s * sensor->full_well;
+  size_t values = (size_t)signal->width * (size_t)signal->height * (size_t)signal->channels;
+  if (signal->radiance != self->exposure.radiance) {
+    spread_over_pixels(self);
+  }
+  clt_plan_signal(&self->scene->plan, signal);
+  for (size_t k = 0; k < values; k++) {
+    signal->electrons[k] = fmax(0.0, gain * (double)signal->radiance[k]);
+  }
+  clt_plan_electrons(&self->scene->plan, signal);
+}
+
+/* Samples of pixels x <= pixel < end of row y. */
+static void form_run(simulated_camera *self, uint64_t key, int y, int x, int end) {
+  const clt_signal *signal = &self->signal;
+  double values[RUN * CLT_SIM_CHANNELS_MAX], none[RUN * CLT_SIM_CHANNELS_MAX];
+  int channels = signal->channels, across = self->width / signal->width, down = self->height / signal->height;
+  clt_row row = {.key = key,
+                 .first = ((size_t)y * (size_t)self->width + (size_t)x) * (size_t)channels,
+                 .count = (end - x) * channels,
+                 .values = values,
+                 .none = signal->none != NULL ? none : NULL};
+  for (int c = 0; c < channels; c++) {
+    size_t line = ((size_t)c * (size_t)signal->height + (size_t)(y / down)) * (size_t)signal->width;
+    for (int k = 0; k < end - x; k++) {
+      size_t from = line + (size_t)((x + k) / across);
+      values[k * channels + c] = signal->electrons[from];
+      none[k * channels + c] = signal->none != NULL ? signal->none[from] : 0.0;
+    }
+  }
+  clt_plan_samples(&self->scene->plan, &row);
+  for (int k = 0; k < row.count; k++) {
+    self->samples[row.first + (size_t)k] = (uint16_t)values[k];
+  }
+}
+
+static void form_samples(simulated_camera *self, uint32_t sequence) {
+  uint64_t key = clt_noise_key(self->scene->description.seed, sequence);
+#pragma omp parallel for schedule(static) if (self->width * self->height * self->signal.channels > FEW_SAMPLES)
+  for (int y = 0; y < self->height; y++) {
+    for (int x = 0; x < self->width; x += RUN) {
+      form_run(self, key, y, x, x + RUN < self->width ? x + RUN : self->width);
+    }
+  }
+}
+
+/* The light of a frame, row by row where the shutter rolls. Returns when the last row ends. */
+static int64_t collect_light(simulated_camera *self, const clt_shutter *taken) {
+  clt_scene *scene = self->scene;
+  int rows = self->exposure.height / self->bands;
+  for (int b = 0; b < self->bands; b++) {
+    int64_t start_ns = taken->start_ns + b * scene->line_ns;
+    self->band[b] = (clt_band){.first = b * rows,
+                               .last = (b + 1) * rows,
+                               .start_ns = start_ns,
+                               .end_ns = start_ns + clt_shutter_exposure_ns(taken)};
+    clt_timeline_expose(&scene->timeline, &self->band[b], &self->exposure);
+  }
+  clt_plan_expose(&scene->plan, &self->exposure, self->band, self->bands);
+  return self->band[self->bands - 1].end_ns;
+}
+
 /* Takes the next wanted frame off the clock into `taken` and collects its light; under the scene's lock. */
 static clt_status expose(simulated_camera *self, int64_t not_before_ns, double timeout_s, clt_shutter *taken,
-                         clt_error *error) {
+                         clt_fate *fate, clt_error *error) {
   clt_scene *scene = self->scene;
   *taken = self->shutter;
   double wait_s = ((double)not_before_ns - (double)scene->now_ns) * 1e-9;
   if (wait_s <= timeout_s) {
     clt_shutter_advance(taken, not_before_ns, scene->now_ns);
+    while ((*fate = clt_plan_frame(&scene->plan, taken->sequence)).dropped) {
+      clt_shutter_step(taken);
+    }
     wait_s = (double)(taken->start_ns - scene->now_ns) * 1e-9;
   }
   if (wait_s > timeout_s) {
@@ -105,8 +150,7 @@ static clt_status expose(simulated_camera *self, int64_t not_before_ns, double t
     return clt_fail(error, CLT_TIMEOUT, "the simulated camera's next wanted frame starts in %.3g s, after %.3g s",
                     wait_s, timeout_s);
   }
-  int64_t end_ns = taken->start_ns + clt_shutter_exposure_ns(taken);
-  clt_timeline_expose(&scene->timeline, taken->start_ns, end_ns, self->radiance);
+  int64_t end_ns = collect_light(self, taken) + fate->late_ns;
   self->shutter = *taken;
   clt_shutter_step(&self->shutter);
   scene->now_ns = end_ns > scene->now_ns ? end_ns : scene->now_ns;
@@ -118,14 +162,18 @@ static clt_status next(clt_camera *camera, int64_t not_before_ns, double timeout
                        clt_error *error) {
   simulated_camera *self = (simulated_camera *)camera;
   clt_shutter taken;
+  clt_fate fate = {0};
   pthread_mutex_lock(&self->scene->lock);
-  clt_status status = expose(self, not_before_ns, timeout_s, &taken, error);
+  clt_status status = expose(self, not_before_ns, timeout_s, &taken, &fate, error);
   pthread_mutex_unlock(&self->scene->lock);
   if (status != CLT_OK) {
     return status;
   }
-  expect_electrons(self, taken.exposure_s);
-  form_samples(self, taken.sequence);
+  if (!fate.stuck || !self->delivered) {
+    expect_electrons(self, taken.exposure_s);
+    form_samples(self, taken.sequence);
+    self->delivered = true;
+  }
   *frame = (clt_frame){.width = self->width,
                        .height = self->height,
                        .channels = self->scene->description.channels,
@@ -138,9 +186,15 @@ static clt_status next(clt_camera *camera, int64_t not_before_ns, double timeout
 }
 
 static void destroy(simulated_camera *self) {
-  free(self->radiance);
-  free(self->electrons);
-  free(self->none);
+  if (self->signal.radiance != self->exposure.radiance) {
+    free(self->signal.radiance);
+  }
+  free(self->exposure.radiance);
+  free(self->exposure.scratch);
+  free(self->signal.scratch);
+  free(self->signal.electrons);
+  free(self->signal.none);
+  free(self->band);
   free(self->samples);
   free(self);
 }
@@ -157,6 +211,35 @@ static void close_camera(clt_camera *camera) {
 
 static const clt_camera_driver driver = {"simulated", describe, set_exposure, next, close_camera};
 
+/* Buffers as coarse as the scene's effects allow, and those that its effects ask for; false where memory is short. */
+static bool make_buffers(simulated_camera *self) {
+  const clt_scene_description *description = &self->scene->description;
+  const clt_plan *plan = &self->scene->plan;
+  int pixels = description->camera.cell_pixels, split = plan->per_row ? pixels : 1, channels = description->channels;
+  clt_exposure *exposure = &self->exposure;
+  clt_signal *signal = &self->signal;
+  *exposure = (clt_exposure){
+      .width = description->width, .height = description->height * split, .channels = channels, .split = split};
+  *signal = (clt_signal){.width = plan->per_pixel ? self->width : exposure->width,
+                         .height = plan->per_pixel ? self->height : exposure->height,
+                         .channels = channels};
+  size_t cells = (size_t)exposure->width * (size_t)exposure->height * (size_t)channels;
+  size_t values = (size_t)signal->width * (size_t)signal->height * (size_t)channels;
+  bool exposes = clt_plan_any(plan, clt_effect_has_expose), signals = clt_plan_any(plan, clt_effect_has_signal);
+  bool counts = clt_plan_any(plan, clt_effect_has_electrons);
+  self->bands = plan->per_row ? exposure->height : 1;
+  self->band = clt_alloc((size_t)self->bands, sizeof *self->band);
+  exposure->radiance = clt_alloc(cells, sizeof *exposure->radiance);
+  exposure->scratch = exposes ? clt_alloc(cells, sizeof *exposure->scratch) : NULL;
+  signal->radiance = plan->per_pixel ? clt_alloc(values, sizeof *signal->radiance) : exposure->radiance;
+  signal->scratch = signals ? clt_alloc(values, sizeof *signal->scratch) : NULL;
+  signal->electrons = clt_alloc(values, sizeof *signal->electrons);
+  signal->none = counts ? clt_alloc(values, sizeof *signal->none) : NULL;
+  self->samples = clt_alloc((size_t)self->width * (size_t)self->height * (size_t)channels, sizeof *self->samples);
+  return self->band && exposure->radiance && (exposure->scratch || !exposes) && signal->radiance &&
+         (signal->scratch || !signals) && signal->electrons && (signal->none || !counts) && self->samples;
+}
+
 static simulated_camera *create(clt_scene *scene) {
   const clt_scene_description *description = &scene->description;
   simulated_camera *self = clt_alloc(1, sizeof *self);
@@ -167,16 +250,10 @@ static simulated_camera *create(clt_scene *scene) {
   self->scene = scene;
   self->width = description->width * description->camera.cell_pixels;
   self->height = description->height * description->camera.cell_pixels;
-  self->values = scene->timeline.values;
   self->shutter = (clt_shutter){.frame_ns = llround(description->camera.frame_s * 1e9),
                                 .exposure_s = fmin(description->camera.frame_s, CLT_EXPOSURE_MAX_S),
-                                .delay = description->camera.exposure_delay};
-  self->radiance = clt_alloc(self->values, sizeof *self->radiance);
-  self->electrons = clt_alloc(self->values, sizeof *self->electrons);
-  self->none = clt_alloc(self->values, sizeof *self->none);
-  self->samples =
-      clt_alloc((size_t)self->width * (size_t)self->height * (size_t)description->channels, sizeof *self->samples);
-  if (!self->radiance || !self->electrons || !self->none || !self->samples) {
+                                .delay = scene->exposure_delay};
+  if (!make_buffers(self)) {
     destroy(self);
     return NULL;
   }

@@ -25,10 +25,18 @@ typedef struct clt_camera_description {
   clt_curve response;
   double responsivity;          /* fraction of full well per radiance and second; 0: chosen to suit the scene */
   double full_well, read_noise; /* electrons */
+  bool photon_noise;            /* electrons are counted, so that their number varies */
   int black_level;              /* code value without light */
   double frame_s;
   int exposure_delay; /* frames from a request until it holds */
 } clt_camera_description;
+
+/* Strengths of the effects that have keys of their own; zero strength is an effect left out. */
+typedef struct clt_effects_description {
+  /* light of channel c = sum over k of crosstalk[c][k] drive of channel k */
+  double crosstalk[CLT_SIM_CHANNELS_MAX][CLT_SIM_CHANNELS_MAX];
+  double vignetting; /* share of the light that the image's corner loses, 0..0.95 */
+} clt_effects_description;
 
 typedef struct clt_scene_description {
   char path[CLT_PATH_MAX];
@@ -38,6 +46,7 @@ typedef struct clt_scene_description {
   clt_camera_description camera;
   double ambient[CLT_SIM_CHANNELS_MAX]; /* radiance added to every cell */
   uint64_t seed;
+  clt_effects_description effects;
   clt_rectangle surfaces[CLT_SURFACES_MAX];
   int surface_count;
   clt_transport *transport; /* of a transport_file, owned here; NULL where there are surfaces */
@@ -47,6 +56,9 @@ typedef struct clt_scene_description {
  * and is finished by it in either case. */
 clt_status clt_scene_read(const char *path, clt_scene_description *description, clt_error *error);
 void clt_scene_description_finish(clt_scene_description *description);
+
+/* Ambient radiance of the brightest channel. */
+double clt_ambient_most(const clt_scene_description *description);
 
 /* Centre of sub-ray `ray` (0..rays*rays-1) of a cell (row-major, row 0 at the top): its direction from the projector,
  * and the solid angle it stands for, sr. */

@@ -51,6 +51,10 @@ static double poisson(double u, double mean, double none) {
   return count;
 }
 
+double clt_noise_none(double mean) {
+  return mean < EXACT_BELOW ? exp(-mean) : 0.0;
+}
+
 double clt_noise_electrons(uint64_t key, uint64_t sample, double mean, double none, double read_noise) {
   double normal = clt_noise_normal(clt_noise_uniform(key, 2 * sample));
   if (mean >= EXACT_BELOW) {

@@ -1,5 +1,4 @@
-/* The simulated projector: quantises code values, decodes them by its response and lights the room after its latency.
- */
+/* The simulated projector: quantises code values, turns them into drive and lights the room after its latency. */
 #include <stdlib.h>
 
 #include "base/memory.h"
@@ -8,8 +7,7 @@
 typedef struct simulated_projector {
   clt_projector base;
   clt_scene *scene;
-  float *drive_of_code; /* 1 << bits values */
-  float *drive;         /* channels * cells values of work space */
+  float *drive; /* channels * cells values of work space */
 } simulated_projector;
 
 static void describe(const clt_projector *projector, clt_projector_info *info) {
@@ -40,13 +38,12 @@ static clt_status present(clt_projector *projector, const float *codes, int64_t 
   float full = (float)((1 << panel->bits) - 1);
   for (size_t k = 0; k < values; k++) {
     float code = codes[k] > 0.0f ? codes[k] : 0.0f; /* NaN is dark */
-    self->drive[k] = self->drive_of_code[lroundf(full * (code < 1.0f ? code : 1.0f))];
+    self->drive[k] = scene->drive_of_code[lroundf(full * (code < 1.0f ? code : 1.0f))];
   }
   pthread_mutex_lock(&scene->lock);
   int64_t start_ns = next_refresh(scene->now_ns, panel->refresh_s);
   clt_timeline_forget(&scene->timeline, scene->now_ns - llround(CLT_EXPOSURE_MAX_S * 1e9));
-  clt_status status =
-      clt_timeline_show(&scene->timeline, self->drive, start_ns + llround(panel->latency_s * 1e9), error);
+  clt_status status = clt_timeline_show(&scene->timeline, self->drive, start_ns + scene->latency_ns, error);
   if (status == CLT_OK) {
     scene->now_ns = start_ns;
     *shown_ns = start_ns;
@@ -56,7 +53,6 @@ static clt_status present(clt_projector *projector, const float *codes, int64_t 
 }
 
 static void destroy(simulated_projector *self) {
-  free(self->drive_of_code);
   free(self->drive);
   free(self);
 }
@@ -74,22 +70,16 @@ static void close_projector(clt_projector *projector) {
 static const clt_projector_driver driver = {"simulated", describe, present, close_projector};
 
 static simulated_projector *create(clt_scene *scene) {
-  const clt_projector_description *panel = &scene->description.projector;
-  int codes = 1 << panel->bits;
   simulated_projector *self = clt_alloc(1, sizeof *self);
   if (self == NULL) {
     return NULL;
   }
-  self->drive_of_code = clt_alloc((size_t)codes, sizeof(float));
-  self->drive = clt_alloc(scene->timeline.values, sizeof(float));
-  if (self->drive_of_code == NULL || self->drive == NULL) {
-    destroy(self);
-    return NULL;
-  }
   self->base.driver = &driver;
   self->scene = scene;
-  for (int code = 0; code < codes; code++) {
-    self->drive_of_code[code] = (float)clt_curve_decode(&panel->response, (double)code / (codes - 1));
+  self->drive = clt_alloc(scene->timeline.values, sizeof(float));
+  if (self->drive == NULL) {
+    destroy(self);
+    return NULL;
   }
   return self;
 }

@@ -2,29 +2,54 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/clock.h"
 #include "base/memory.h"
 #include "sim/light.h"
 #include "sim/state.h"
 
-/* b0 = ambient + what the panel's leak lights. T is for drive above the leak, so that a fully driven panel gives
- * T 1 + b0; light = black + (1 - black) drive makes the leak black / (1 - black) of T 1. */
-static clt_status complete_black(clt_scene *scene, clt_error *error) {
+static clt_status out_of_memory(const clt_scene *scene, clt_error *error) {
+  return clt_fail(error, CLT_FAILED, "%s: out of memory", scene->description.path);
+}
+
+/* T 1, and room for what the effects add to the black. */
+static clt_status take_flood(clt_scene *scene, clt_error *error) {
   const clt_scene_description *description = &scene->description;
-  size_t cells = (size_t)description->width * (size_t)description->height;
-  double leak = description->projector.black / (1.0 - description->projector.black);
-  double *sums = clt_alloc(cells, sizeof *sums);
-  if (sums == NULL) {
-    return clt_fail(error, CLT_FAILED, "%s: out of memory", description->path);
+  size_t cells = (size_t)description->width * (size_t)description->height, channels = (size_t)description->channels;
+  scene->flood = clt_alloc(channels * cells, sizeof *scene->flood);
+  scene->added = clt_alloc(channels * cells, sizeof *scene->added);
+  if (scene->flood == NULL || scene->added == NULL) {
+    return out_of_memory(scene, error);
   }
-  for (int c = 0; c < description->channels; c++) {
+  for (size_t c = 0; c < channels; c++) {
+    clt_transport_row_sums(scene->transport, (int)c, &scene->flood[c * cells]);
+    scene->full_drive[c] = 1.0;
+  }
+  return CLT_OK;
+}
+
+/* b0 = what the transport brings + what the effects added. */
+static void complete_black(clt_scene *scene) {
+  size_t cells = (size_t)scene->description.width * (size_t)scene->description.height;
+  for (int c = 0; c < scene->description.channels; c++) {
     float *black = clt_transport_black(scene->transport, c);
-    clt_transport_row_sums(scene->transport, c, sums);
     for (size_t i = 0; i < cells; i++) {
-      black[i] += (float)(description->ambient[c] + leak * sums[i]);
-      scene->brightest = fmax(scene->brightest, (double)black[i] + sums[i]);
+      size_t k = (size_t)c * cells + i;
+      black[i] += (float)scene->added[k];
+      scene->brightest = fmax(scene->brightest, (double)black[i] + scene->full_drive[c] * scene->flood[k]);
     }
   }
-  free(sums);
+}
+
+/* The panel's codes as drive in equal steps, which projector-response changes. */
+static clt_status lay_out_codes(clt_scene *scene, clt_error *error) {
+  int codes = 1 << scene->description.projector.bits;
+  scene->drive_of_code = clt_alloc((size_t)codes, sizeof *scene->drive_of_code);
+  if (scene->drive_of_code == NULL) {
+    return out_of_memory(scene, error);
+  }
+  for (int code = 0; code < codes; code++) {
+    scene->drive_of_code[code] = (float)((double)code / (codes - 1));
+  }
   return CLT_OK;
 }
 
@@ -49,29 +74,33 @@ static double choose_responsivity(const clt_scene *scene) {
   return scene->brightest > 0.0 ? 0.7 / (scene->brightest * description->projector.refresh_s) : 1.0;
 }
 
-static clt_status prepare(clt_scene *scene, const char *path, clt_error *error) {
-  clt_status status = clt_scene_read(path, &scene->description, error);
-  if (status != CLT_OK) {
-    return status;
-  }
+static clt_status take_transport(clt_scene *scene, clt_error *error) {
+  int64_t start_ns = clt_clock_ns();
+  clt_status status = CLT_OK;
   if (scene->description.transport != NULL) {
     scene->transport = scene->description.transport;
     scene->description.transport = NULL;
   } else {
     status = clt_light_transport(&scene->description, &scene->transport, error);
   }
-  if (status == CLT_OK) {
-    status = complete_black(scene, error);
-  }
-  if (status == CLT_OK) {
-    complete_provenance(scene);
-    scene->responsivity = choose_responsivity(scene);
-    status = clt_appearance_init(&scene->appearance, scene->transport, error);
-  }
-  if (status == CLT_OK) {
-    status = clt_timeline_init(&scene->timeline, &scene->appearance, error);
-  }
+  scene->light_ms = 1e3 * clt_clock_since(start_ns);
   return status;
+}
+
+static clt_status prepare(clt_scene *scene, const char *path, clt_error *error) {
+  clt_status (*const steps[])(clt_scene *, clt_error *) = {take_transport, take_flood, lay_out_codes, clt_plan_compile};
+  clt_status status = clt_scene_read(path, &scene->description, error);
+  for (size_t k = 0; k < sizeof steps / sizeof steps[0] && status == CLT_OK; k++) {
+    status = steps[k](scene, error);
+  }
+  if (status != CLT_OK) {
+    return status;
+  }
+  complete_black(scene);
+  complete_provenance(scene);
+  scene->responsivity = choose_responsivity(scene);
+  scene->timeline = (clt_timeline){.light = clt_plan_light, .context = scene, .values = scene->plan.values};
+  return clt_timeline_init(&scene->timeline, error);
 }
 
 clt_status clt_scene_open(const char *path, clt_scene **out, clt_error *error) {
@@ -92,7 +121,10 @@ clt_status clt_scene_open(const char *path, clt_scene **out, clt_error *error) {
 void clt_scene_close(clt_scene *scene) {
   if (scene != NULL) {
     clt_timeline_finish(&scene->timeline);
-    clt_appearance_finish(&scene->appearance);
+    clt_plan_finish(&scene->plan);
+    free(scene->flood);
+    free(scene->added);
+    free(scene->drive_of_code);
     clt_transport_destroy(scene->transport);
     clt_scene_description_finish(&scene->description);
     pthread_mutex_destroy(&scene->lock);
@@ -147,21 +179,30 @@ clt_status clt_scene_appearance(const clt_scene *scene, const clt_image *drive, 
                     "the drive is %d x %d with %d channels, but the scene's grid is %d x %d with %d", drive->width,
                     drive->height, drive->channels, description->width, description->height, description->channels);
   }
+  size_t values = cells * (size_t)description->channels;
   double *x = clt_alloc(2 * cells, sizeof *x), *y = x + cells;
-  if (x == NULL) {
-    return clt_fail(error, CLT_FAILED, "out of memory for the scene's appearance");
+  float *shown = clt_alloc(2 * values, sizeof *shown), *scratch = shown + values;
+  clt_status status = x != NULL && shown != NULL ? clt_image_init(radiance, description->channels, description->height,
+                                                                  description->width, error)
+                                                 : out_of_memory(scene, error);
+  if (status == CLT_OK) {
+    memcpy(shown, drive->data, values * sizeof *shown);
+    clt_plan_drive(&scene->plan, shown, scratch);
   }
-  clt_status status = clt_image_init(radiance, description->channels, description->height, description->width, error);
   for (int c = 0; c < description->channels && status == CLT_OK; c++) {
     const float *black = clt_transport_black(scene->transport, c);
     for (size_t j = 0; j < cells; j++) {
-      x[j] = (double)drive->data[(size_t)c * cells + j];
+      x[j] = (double)shown[(size_t)c * cells + j];
     }
     clt_transport_apply(scene->transport, c, x, y);
     for (size_t i = 0; i < cells; i++) {
       radiance->data[(size_t)c * cells + i] = (float)((double)black[i] + y[i]);
     }
   }
+  if (status == CLT_OK) {
+    clt_plan_radiance(&scene->plan, radiance->data, scratch);
+  }
   free(x);
+  free(shown);
   return status;
 }

@@ -3,6 +3,7 @@
 
 #include "base/file.h"
 #include "base/settings.h"
+#include "sim/effects/plan.h"
 #include "sim/scene_file.h"
 
 /* The keys that describe geometry and so mean nothing beside a transport_file. */
@@ -105,6 +106,7 @@ static void read_camera(clt_section root, clt_camera_description *camera) {
       clt_section_has(section, "responsivity") ? clt_read_number(section, "responsivity", 1.0, 1e-9, 1e9) : 0.0;
   camera->full_well = clt_read_number(section, "full_well", 15000.0, 10.0, 1e7);
   camera->read_noise = clt_read_number(section, "read_noise", 4.0, 0.0, 1000.0);
+  camera->photon_noise = clt_read_flag(section, "photon_noise", true);
   camera->black_level = clt_read_integer(section, "black_level", 1 << (camera->bits - 6), 0, 1 << (camera->bits - 1));
   camera->frame_s = 1.0 / clt_read_number(section, "fps", 60.0, 0.1, 1000.0);
   camera->exposure_delay = clt_read_integer(section, "exposure_delay_frames", 1, 0, CLT_EXPOSURE_DELAY_MAX);
@@ -127,6 +129,7 @@ static void read_scene(clt_section root, const char *path, clt_scene_description
   read_camera(root, &description->camera);
   clt_scene_read_channels(root, "ambient", description->channels, 0.002, 0.0, 1e6, description->ambient);
   description->seed = (uint64_t)clt_read_integer(root, "seed", 1, 0, 2147483647);
+  clt_effects_read(root, description);
   if (!file) {
     clt_scene_read_surfaces(root, description);
   }
@@ -158,4 +161,12 @@ clt_status clt_scene_read(const char *path, clt_scene_description *description, 
 void clt_scene_description_finish(clt_scene_description *description) {
   clt_transport_destroy(description->transport);
   description->transport = NULL;
+}
+
+double clt_ambient_most(const clt_scene_description *description) {
+  double most = 0.0;
+  for (int c = 0; c < description->channels; c++) {
+    most = fmax(most, description->ambient[c]);
+  }
+  return most;
 }

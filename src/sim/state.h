@@ -6,12 +6,21 @@
 
 #include "counterlight/scene.h"
 #include "sim/description.h"
+#include "sim/effects/plan.h"
 #include "sim/timeline.h"
 
 struct clt_scene {
   clt_scene_description description;
   clt_transport *transport; /* T and b0 */
-  clt_appearance appearance;
+  double light_ms;          /* that computing or reading T took */
+  double *flood;            /* channels * cells values: T 1 */
+  double *added;            /* channels * cells values: what the effects add to the transport's own black */
+  double full_drive[CLT_SIM_CHANNELS_MAX]; /* most drive of a channel that reaches the surfaces */
+  float *drive_of_code;                    /* of the panel, 1 << bits values */
+  int64_t latency_ns;                      /* from a refresh until its light is on the surface */
+  int exposure_delay;                      /* frames from a request until it holds */
+  int64_t line_ns;                         /* from the exposure of a row of pixels to that of the next */
+  clt_plan plan;
   double brightest;    /* radiance of the brightest cell under full drive */
   double responsivity; /* of the camera, described or chosen */
   /* Below: under lock, for the projector and the camera may be called from two threads. */

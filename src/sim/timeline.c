@@ -32,9 +32,7 @@ static void free_list(clt_lighting *lighting) {
   }
 }
 
-clt_status clt_timeline_init(clt_timeline *timeline, clt_appearance *appearance, clt_error *error) {
-  timeline->appearance = appearance;
-  timeline->values = appearance->cells * (size_t)appearance->channels;
+clt_status clt_timeline_init(clt_timeline *timeline, clt_error *error) {
   timeline->first = timeline->last = take_spare(timeline);
   if (timeline->first == NULL) {
     return clt_fail(error, CLT_FAILED, "out of memory for the projector's first pattern");
@@ -76,21 +74,38 @@ void clt_timeline_forget(clt_timeline *timeline, int64_t before_ns) {
   }
 }
 
-void clt_timeline_expose(clt_timeline *timeline, int64_t start_ns, int64_t end_ns, float *radiance) {
-  memset(radiance, 0, timeline->values * sizeof *radiance);
+/* The band gains share of what a pattern lights. */
+static void add_share(const clt_lighting *lighting, float share, const clt_band *band, clt_exposure *exposure) {
+  size_t width = (size_t)exposure->width, height = (size_t)exposure->height,
+         cell_rows = height / (size_t)exposure->split;
+  for (size_t c = 0; c < (size_t)exposure->channels; c++) {
+    for (size_t y = (size_t)band->first; y < (size_t)band->last; y++) {
+      const float *from = &lighting->radiance[(c * cell_rows + y / (size_t)exposure->split) * width];
+      float *to = &exposure->radiance[(c * height + y) * width];
+      for (size_t x = 0; x < width; x++) {
+        to[x] += share * from[x];
+      }
+    }
+  }
+}
+
+void clt_timeline_expose(clt_timeline *timeline, const clt_band *band, clt_exposure *exposure) {
+  size_t width = (size_t)exposure->width, rows = (size_t)(band->last - band->first);
+  for (int c = 0; c < exposure->channels; c++) {
+    size_t first = ((size_t)c * (size_t)exposure->height + (size_t)band->first) * width;
+    memset(&exposure->radiance[first], 0, rows * width * sizeof *exposure->radiance);
+  }
   for (clt_lighting *lighting = timeline->first; lighting != NULL; lighting = lighting->next) {
-    int64_t from = lighting->lit_ns > start_ns ? lighting->lit_ns : start_ns;
-    int64_t to = lighting->next != NULL && lighting->next->lit_ns < end_ns ? lighting->next->lit_ns : end_ns;
+    int64_t from = lighting->lit_ns > band->start_ns ? lighting->lit_ns : band->start_ns;
+    int64_t to =
+        lighting->next != NULL && lighting->next->lit_ns < band->end_ns ? lighting->next->lit_ns : band->end_ns;
     if (to <= from) {
       continue;
     }
     if (!lighting->computed) {
-      clt_appearance_of(timeline->appearance, lighting->drive, lighting->radiance);
+      timeline->light(timeline->context, lighting->drive, lighting->radiance);
       lighting->computed = true;
     }
-    float share = (float)((double)(to - from) / (double)(end_ns - start_ns));
-    for (size_t k = 0; k < timeline->values; k++) {
-      radiance[k] += share * lighting->radiance[k];
-    }
+    add_share(lighting, (float)((double)(to - from) / (double)(band->end_ns - band->start_ns)), band, exposure);
   }
 }

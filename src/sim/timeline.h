@@ -2,7 +2,12 @@
 #ifndef CLT_SIM_TIMELINE_H
 #define CLT_SIM_TIMELINE_H
 
-#include "sim/appearance.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "counterlight/status.h"
+#include "sim/effects/effect.h"
 
 /* A pattern that lights the room from lit_ns until the next one does. */
 typedef struct clt_lighting {
@@ -13,14 +18,17 @@ typedef struct clt_lighting {
 } clt_lighting;
 
 typedef struct clt_timeline {
-  clt_appearance *appearance; /* outlives the timeline */
+  /* radiance of the cells under a drive, values entries each */
+  void (*light)(void *context, const float *drive, float *radiance);
+  void *context;              /* outlives the timeline */
   size_t values;              /* channels * cells */
   clt_lighting *first, *last; /* by ascending time; never empty after init */
   clt_lighting *spare;        /* forgotten ones, to be used again */
 } clt_timeline;
 
-/* Starts with a dark panel since ever. timeline was zeroed by the caller and is finished by it in either case. */
-clt_status clt_timeline_init(clt_timeline *timeline, clt_appearance *appearance, clt_error *error);
+/* Its light, context and values are set. Starts with a dark panel since ever. timeline was zeroed by the caller and is
+ * finished by it in either case. */
+clt_status clt_timeline_init(clt_timeline *timeline, clt_error *error);
 void clt_timeline_finish(clt_timeline *timeline);
 
 /* From lit_ns on (not before any earlier one) the room is lit by drive, which is copied. */
@@ -28,7 +36,7 @@ clt_status clt_timeline_show(clt_timeline *timeline, const float *drive, int64_t
 /* Drops what ended at or before `before_ns`. */
 void clt_timeline_forget(clt_timeline *timeline, int64_t before_ns);
 
-/* Mean radiance over start_ns <= time < end_ns (end > start): each pattern by its share of the time. */
-void clt_timeline_expose(clt_timeline *timeline, int64_t start_ns, int64_t end_ns, float *radiance);
+/* Mean radiance of a band of an exposure over its time: each pattern by its share of it. */
+void clt_timeline_expose(clt_timeline *timeline, const clt_band *band, clt_exposure *exposure);
 
 #endif

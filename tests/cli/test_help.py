@@ -4,7 +4,7 @@ import sys
 import unittest
 
 PROGRAM = sys.argv[1]
-COMMANDS = ("demo acquire compensate relight inspect simulate status show watch reacquire snapshot hold resume "
+COMMANDS = ("demo acquire compensate relight inspect simulate scene status show watch reacquire snapshot hold resume "
             "reload").split()
 
 
@@ -43,7 +43,7 @@ class Help(unittest.TestCase):
             self.assertIn("--no-such-option", answer.stderr)
 
     def test_bad_usage_is_exit_2(self):
-        for words in ([], ["nonsense"], ["--nonsense"], ["compensate"], ["inspect", "a", "b"], ["demo", "surplus"]):
+        for words in ([], ["nonsense"], ["--nonsense"], ["compensate"], ["inspect", "a", "b"], ["scene", "explain"], ["scene", "what", "a"], ["demo", "surplus"]):
             answer = run(*words)
             self.assertEqual((answer.returncode, answer.stdout), (2, ""), words)
             self.assertTrue(answer.stderr)

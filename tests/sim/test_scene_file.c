@@ -39,6 +39,13 @@ static const refusal refusals[] = {
     {GRID "camera = { bits = 7; }; " WHITE WALL, "bits", "legal is 8 to 16"},
     {GRID "camera = { black_level = 3000; }; " WHITE WALL, "black_level", "legal is 0 to 2048"},
     {GRID "camera = { exposure_delay_frames = 9; }; " WHITE WALL, "exposure_delay_frames", "legal is 0 to 8"},
+    {GRID "projector = { crosstalk = [1, 0, 0]; }; " WHITE WALL, "crosstalk", "legal is 9 to 9"},
+    {GRID "projector = { crosstalk = [1, 0, 0, 0, 1, 0, 0, 0, 3]; }; " WHITE WALL, "crosstalk", "legal is 0 to 2"},
+    {"grid = { width = 4; height = 3; channels = 1; }; projector = { crosstalk = [1, 0, 0, 0, 1, 0, 0, 0, 1]; }; " WHITE
+         WALL,
+     "crosstalk", "needs 3 channels"},
+    {GRID "camera = { vignetting = 0.96; }; " WHITE WALL, "vignetting", "legal is 0 to 0.95"},
+    {GRID "camera = { photon_noise = 1; }; " WHITE WALL, "photon_noise", "must be true or false"},
     {GRID "ambient = -1.0; " WHITE WALL, "ambient", "legal is 0 to 1e+06"},
     {GRID "seed = \"x\"; " WHITE WALL, "seed", "must be a number"},
     {GRID "materials = ( { name = \"white\"; albedo = 1.0; } ); " WALL, "albedo", "0 to below 1"},
