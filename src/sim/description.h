@@ -8,7 +8,7 @@
 #include "counterlight/transport.h"
 #include "sim/geometry.h"
 
-enum { CLT_SURFACES_MAX = 64, CLT_RECTANGLE_CELLS_MAX = 6400, CLT_EXPOSURE_DELAY_MAX = 8, CLT_SIM_CHANNELS_MAX = 3 };
+enum { CLT_SURFACES_MAX = 2000, CLT_RECTANGLE_CELLS_MAX = 6400, CLT_EXPOSURE_DELAY_MAX = 8, CLT_SIM_CHANNELS_MAX = 3 };
 
 typedef struct clt_projector_description {
   clt_pinhole pinhole;

@@ -1,6 +1,10 @@
 #include <string.h>
 
 #include "sim/scene_file.h"
+#include "sim/shapes.h"
+
+/* Entries of the lists of a scene file. */
+enum { MATERIALS_MAX = 64, ENTRIES_MAX = 64, PIECES_MAX = 360 };
 
 typedef struct material {
   const char *name;
@@ -18,8 +22,8 @@ static const material *find_material(const material *materials, int count, const
 
 static int read_materials(clt_section root, int channels, material *materials) {
   int count = clt_section_count(root, "materials");
-  if (count > CLT_SURFACES_MAX) {
-    clt_section_fail(root, "materials", "has %d materials; legal is at most %d", count, CLT_SURFACES_MAX);
+  if (count > MATERIALS_MAX) {
+    clt_section_fail(root, "materials", "has %d materials; legal is at most %d", count, MATERIALS_MAX);
     return 0;
   }
   for (int k = 0; k < count; k++) {
@@ -40,43 +44,129 @@ static int read_materials(clt_section root, int channels, material *materials) {
   return count;
 }
 
-static void read_surface(clt_section item, const material *materials, int count, clt_rectangle *surface) {
-  static const char *const vectors[] = {"corner", "u", "v"};
-  for (int k = 0; k < 3; k++) {
-    if (!clt_section_has(item, vectors[k])) {
-      clt_section_fail(item, NULL, "a surface needs %s = [x, y, z]", vectors[k]);
-    }
+/* A point or direction that must be given. */
+static clt_vector read_needed(clt_section item, const char *what, const char *key, clt_vector fallback) {
+  if (!clt_section_has(item, key)) {
+    clt_section_fail(item, NULL, "a %s needs %s = [x, y, z]", what, key);
   }
-  surface->corner = clt_scene_read_vector(item, "corner", (clt_vector){0.0, 0.0, 0.0});
-  surface->u = clt_scene_read_vector(item, "u", (clt_vector){1.0, 0.0, 0.0});
-  surface->v = clt_scene_read_vector(item, "v", (clt_vector){0.0, 1.0, 0.0});
-  if (!clt_rectangle_complete(surface)) {
+  return clt_scene_read_vector(item, key, fallback);
+}
+
+static clt_facing read_facing(clt_section item) {
+  static const char *const names[] = {"out", "in", NULL};
+  return (clt_facing)clt_read_choice(item, "facing", CLT_FACING_OUT, names);
+}
+
+static bool perpendicular(clt_vector a, clt_vector b) {
+  return fabs(vec_dot(a, b)) <= 1e-6 * vec_length(a) * vec_length(b);
+}
+
+static bool too_short(clt_vector a) {
+  return !(vec_length(a) > 1e-6);
+}
+
+/* The readers of the types of surfaces return whether there was room for them. */
+
+static bool read_rectangle(clt_section item, const double *albedo, clt_scene_description *description) {
+  clt_rectangle surface = {.corner = read_needed(item, "surface", "corner", (clt_vector){0.0, 0.0, 0.0}),
+                           .u = read_needed(item, "surface", "u", (clt_vector){1.0, 0.0, 0.0}),
+                           .v = read_needed(item, "surface", "v", (clt_vector){0.0, 1.0, 0.0})};
+  if (!clt_rectangle_complete(&surface)) {
     clt_section_fail(item, "u", "u and v must be longer than 1e-6 and perpendicular, so that they span a rectangle");
   }
+  memcpy(surface.albedo, albedo, sizeof surface.albedo);
+  if (description->surface_count == CLT_SURFACES_MAX) {
+    return false;
+  }
+  description->surfaces[description->surface_count++] = surface;
+  return true;
+}
+
+static bool read_box(clt_section item, const double *albedo, clt_scene_description *description) {
+  clt_vector corner = read_needed(item, "box", "corner", (clt_vector){0.0, 0.0, 0.0});
+  clt_vector edges[3] = {read_needed(item, "box", "u", (clt_vector){1.0, 0.0, 0.0}),
+                         read_needed(item, "box", "v", (clt_vector){0.0, 1.0, 0.0}),
+                         read_needed(item, "box", "w", (clt_vector){0.0, 0.0, 1.0})};
+  for (int k = 0; k < 3; k++) {
+    if (too_short(edges[k]) || !perpendicular(edges[k], edges[(k + 1) % 3])) {
+      clt_section_fail(item, "u", "u, v and w must be longer than 1e-6 and perpendicular, so that they span a box");
+    }
+  }
+  return clt_shape_box(description, corner, edges, read_facing(item), albedo);
+}
+
+static bool read_cylinder(clt_section item, const double *albedo, clt_scene_description *description) {
+  clt_cylinder cylinder = {.centre = read_needed(item, "cylinder", "centre", (clt_vector){0.0, 0.0, 0.0}),
+                           .axis = read_needed(item, "cylinder", "axis", (clt_vector){0.0, 0.0, 1.0}),
+                           .start = read_needed(item, "cylinder", "start", (clt_vector){1.0, 0.0, 0.0})};
+  double degrees = clt_read_number(item, "arc", 360.0, 1.0, 360.0);
+  int fewest = degrees > 180.0 ? 3 : 1;
+  cylinder.arc = degrees * M_PI / 180.0;
+  cylinder.pieces = clt_read_integer(item, "pieces", (int)fmax(fewest, degrees / 15.0), fewest, PIECES_MAX);
+  if (too_short(cylinder.axis) || too_short(cylinder.start) || !perpendicular(cylinder.axis, cylinder.start)) {
+    clt_section_fail(item, "axis", "axis and start must be longer than 1e-6 and perpendicular to each other");
+  } else if (2.0 * vec_length(cylinder.start) * sin(cylinder.arc / (2 * cylinder.pieces)) <= 1e-6) {
+    clt_section_fail(item, "start", "makes pieces less than 1e-6 wide; make start longer or take fewer pieces");
+  }
+  return clt_shape_cylinder(description, &cylinder, read_facing(item), albedo);
+}
+
+static const struct type {
+  const char *name;
+  bool (*read)(clt_section item, const double *albedo, clt_scene_description *description);
+} types[] = {{"rectangle", read_rectangle}, {"box", read_box}, {"cylinder", read_cylinder}};
+enum { TYPES = sizeof types / sizeof types[0] };
+
+static void read_surface(clt_section item, const material *materials, int count, clt_scene_description *description) {
+  const char *names[TYPES + 1] = {NULL};
+  for (int k = 0; k < TYPES; k++) {
+    names[k] = types[k].name;
+  }
+  const struct type *type = &types[clt_read_choice(item, "type", 0, names)];
   const char *name = clt_read_text(item, "material", "", 64);
   const material *found = find_material(materials, count, name);
+  const double black[CLT_SIM_CHANNELS_MAX] = {0.0};
+  if (!type->read(item, found != NULL ? found->albedo : black, description)) {
+    clt_section_fail(item, NULL, "does not fit: a scene has at most %d flat surfaces; take fewer pieces",
+                     CLT_SURFACES_MAX);
+  }
   if (found == NULL) {
     clt_section_fail(item, "material", "\"%s\" is not among the materials; give one of their names", name);
-    return;
   }
-  memcpy(surface->albedo, found->albedo, sizeof surface->albedo);
 }
 
 void clt_scene_read_surfaces(clt_section root, clt_scene_description *description) {
-  material materials[CLT_SURFACES_MAX];
+  material materials[MATERIALS_MAX];
   int known = read_materials(root, description->channels, materials);
   int count = clt_section_count(root, "surfaces");
-  if (count < 1 || count > CLT_SURFACES_MAX) {
-    clt_section_fail(root, "surfaces", "has %d surfaces; legal is 1 to %d", count, CLT_SURFACES_MAX);
+  if (count < 1 || count > ENTRIES_MAX) {
+    clt_section_fail(root, "surfaces", "has %d surfaces; legal is 1 to %d", count, ENTRIES_MAX);
     return;
   }
   for (int k = 0; k < count; k++) {
-    read_surface(clt_section_item(root, "surfaces", k), materials, known, &description->surfaces[k]);
+    read_surface(clt_section_item(root, "surfaces", k), materials, known, description);
   }
-  description->surface_count = count;
+}
+
+/* True where every way out of a place leads to the back of a surface first: inside a solid. */
+static bool inside_solid(const clt_scene_description *description, clt_vector place) {
+  for (int k = 0; k < 27; k++) {
+    clt_vector way = {k % 3 - 1.003, k / 3 % 3 - 1.001, k / 9 - 1.002}; /* turned a little off the usual edges */
+    clt_hit hit = clt_first_hit(description->surfaces, description->surface_count, place, way, -1);
+    if (k != 13 && (hit.surface < 0 || hit.front)) {
+      return false;
+    }
+  }
+  return true;
 }
 
 void clt_scene_check_lit(clt_section root, const clt_scene_description *description) {
+  if (inside_solid(description, description->projector.pinhole.position)) {
+    clt_section_fail(root, "projector",
+                     "its position lies inside an object, with only backs of surfaces around; move it out, or give the "
+                     "object facing = \"in\"");
+    return;
+  }
   bool backs = false;
   for (int cell = 0; cell < description->width * description->height; cell++) {
     for (int ray = 0; ray < description->rays * description->rays; ray++) {

@@ -112,6 +112,26 @@ static void furnace(void **state) {
   destroy(&cube);
 }
 
+/* Objects in a closed room take light from its walls, but none from the room: rows still conserve energy, whatever is
+ * hidden from them. */
+static void furnace_with_an_object(void **state) {
+  (void)state;
+  box cube = {.count = 0};
+  add_cube(&cube, "fclrFB");
+  const clt_vector corner = {0.3, 0.35, 0.2}, u = {0.3, 0.1, 0}, v = {-0.1, 0.3, 0}, w = {0, 0, 0.4};
+  const clt_vector top = vec_add(corner, w), right = vec_add(corner, u), back = vec_add(corner, v);
+  add_wall(&cube, corner, v, u);
+  add_wall(&cube, corner, u, w);
+  add_wall(&cube, corner, w, v);
+  add_wall(&cube, top, u, v);
+  add_wall(&cube, right, v, w);
+  add_wall(&cube, back, w, u);
+  solve_exchange(&cube, 4);
+  assert_rows_conserve(&cube, 1e-9);
+  assert_furnace(&cube, 0.9);
+  destroy(&cube);
+}
+
 /* The Perron root of G: power steps from 1. */
 static double perron(const box *of) {
   size_t count = (size_t)of->count;
@@ -236,6 +256,7 @@ static void part_of_the_light_is_hidden(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(furnace),
+      cmocka_unit_test(furnace_with_an_object),
       cmocka_unit_test(thresholds),
       cmocka_unit_test(screens_block),
       cmocka_unit_test(open_rooms_lose_light),
