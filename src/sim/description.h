@@ -31,10 +31,47 @@ typedef struct clt_camera_description {
   int exposure_delay; /* frames from a request until it holds */
 } clt_camera_description;
 
+typedef struct clt_flicker_description {
+  double mains_hz, depth; /* of the ambient light: its mean is `ambient`, it varies by +- depth of that */
+} clt_flicker_description;
+
+typedef struct clt_drift_description {
+  double per_hour, amplitude; /* relative to the brightness at the start */
+  double period_s;            /* of the swing by amplitude */
+} clt_drift_description;
+
+typedef struct clt_faults_description {
+  double dropped, stuck, late; /* probabilities, of a frame */
+  double late_s;
+} clt_faults_description;
+
+typedef struct clt_subsurface_description {
+  double share, radius; /* of the light; sigma, cells */
+} clt_subsurface_description;
+
+typedef struct clt_vibration_description {
+  double amplitude[2], hz; /* cells to the right and down */
+} clt_vibration_description;
+
+typedef struct clt_change_description {
+  double at_s;                  /* of the scene's clock */
+  int left, top, width, height; /* cells */
+  double factor[CLT_SIM_CHANNELS_MAX];
+} clt_change_description;
+
 /* Strengths of the effects that have keys of their own; zero strength is an effect left out. */
 typedef struct clt_effects_description {
   /* light of channel c = sum over k of crosstalk[c][k] drive of channel k */
   double crosstalk[CLT_SIM_CHANNELS_MAX][CLT_SIM_CHANNELS_MAX];
+  double defocus;   /* of the projector: sigma, cells */
+  double lens_blur; /* of the camera: sigma, pixels */
+  double line_s;    /* from a row of pixels to the next: rolling shutter */
+  clt_flicker_description flicker;
+  clt_drift_description drift;
+  clt_faults_description faults;
+  clt_subsurface_description subsurface;
+  clt_vibration_description vibration;
+  clt_change_description change;
   double vignetting; /* share of the light that the image's corner loses, 0..0.95 */
 } clt_effects_description;
 

@@ -167,6 +167,8 @@ void clt_scene_rig_config(const clt_scene *scene, clt_rig_config *config) {
   choose_exposures(scene, config);
   double longest_s = fmax(config->exposures_s[config->exposure_count - 1], description->camera.frame_s);
   config->timeout_s = 1.0 + config->latency_s + longest_s * (description->camera.exposure_delay + 3);
+  const clt_effects_description *effects = &description->effects;
+  config->timeout_s = config->timeout_s / (1.0 - effects->faults.dropped) + effects->faults.late_s;
   snprintf(config->source, sizeof config->source, "scene %.100s", base_name(description->path));
 }
 
@@ -181,7 +183,7 @@ clt_status clt_scene_appearance(const clt_scene *scene, const clt_image *drive, 
   }
   size_t values = cells * (size_t)description->channels;
   double *x = clt_alloc(2 * cells, sizeof *x), *y = x + cells;
-  float *shown = clt_alloc(2 * values, sizeof *shown), *scratch = shown + values;
+  float *shown = clt_alloc(3 * values, sizeof *shown), *scratch = shown + values;
   clt_status status = x != NULL && shown != NULL ? clt_image_init(radiance, description->channels, description->height,
                                                                   description->width, error)
                                                  : out_of_memory(scene, error);

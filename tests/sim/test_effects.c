@@ -1,54 +1,7 @@
 /* What each effect does to frames, and that an effect of no strength does nothing. */
-#include "rig_pair.h"
+#include "wide.h"
 
-/* A scene with one channel whose frames carry no noise and no response: what is seen is light. */
-#define PLAIN_PANEL "response = \"linear\"; bits = 16; black = 0.0; "
-#define PLAIN_CAMERA "bits = 16; responsivity = 20.0; photon_noise = false; read_noise = 0.0; black_level = 0; "
-static const int64_t SETTLED = 50000000; /* ns: more than the latency */
-
-static float plain_entry(int channel, size_t row, size_t column) {
-  return row == column ? 1.0f : 0.01f * (float)(channel + 1) / (float)(1 + row + column);
-}
-
-/* 6 x 4 cells, 3 channels, light between all cells, no ambient light. */
-static rig_pair wide_open(const char *panel, const char *camera, const char *settings) {
-  char text[1000];
-  snprintf(text, sizeof text,
-           "transport_file = \"t.h5\"; projector = { " PLAIN_PANEL "%s }; camera = { " PLAIN_CAMERA "%s }; %s", panel,
-           camera, settings);
-  room made;
-  room_make(&made, text);
-  room_add_transport(&made, 6, 4, 3, plain_entry, 0.0f);
-  rig_pair pair = pair_of(room_open(&made));
-  room_remove(&made);
-  return pair;
-}
-
-enum { WIDE_CELLS = 24, WIDE_VALUES = 72 };
-
-static void wide_codes(float codes[WIDE_VALUES]) {
-  for (int k = 0; k < WIDE_VALUES; k++) {
-    codes[k] = (float)(k * 7 % 23) / 32.0f;
-  }
-}
-
-/* Signal of a pixel, 0..1. */
-static double pixel(const clt_frame *frame, int x, int y, int channel) {
-  return frame->samples[(y * frame->width + x) * frame->channels + channel] / 65535.0;
-}
-
-static double drive_of(float code) {
-  return rint(65535.0 * (double)code) / 65535.0;
-}
-
-/* T x of a channel in double, for drive x of the whole panel; b0 is the ambient light. */
-static double wide_light(const double *x, int channel, int cell) {
-  double sum = 0.0;
-  for (int j = 0; j < WIDE_CELLS; j++) {
-    sum += (double)plain_entry(channel, (size_t)cell, (size_t)j) * x[channel * WIDE_CELLS + j];
-  }
-  return sum;
-}
+static const int64_t SETTLED = WIDE_SETTLED;
 
 /* The documented way from codes to samples, step by step in double. */
 static void pipeline_in_double(void **state) {
@@ -73,31 +26,130 @@ static void pipeline_in_double(void **state) {
   pair_close(&pair);
 }
 
+/* A frame of codes, settled, and the drive of the codes in double. */
+static clt_frame photograph(rig_pair *pair, float codes[WIDE_VALUES], double drive[WIDE_VALUES]) {
+  wide_codes(codes);
+  for (int k = 0; k < WIDE_VALUES; k++) {
+    drive[k] = wide_drive(codes[k]);
+  }
+  return pair_frame(pair, pair_show(pair, codes) + SETTLED);
+}
+
+/* The frame and the scene's own account show T drive (and no ambient light). */
+static void assert_shows(rig_pair *pair, const clt_frame *frame, float *codes, const double drive[WIDE_VALUES]) {
+  clt_image panel = {.channels = 3, .height = WIDE_HEIGHT, .width = WIDE_WIDTH, .data = codes}, seen = {0};
+  clt_error error = {.status = CLT_OK};
+  assert_ok(clt_scene_appearance(pair->scene, &panel, &seen, &error), error);
+  for (int k = 0; k < WIDE_VALUES; k++) {
+    double light = wide_light(drive, k / WIDE_CELLS, k % WIDE_CELLS);
+    assert_near(wide_seen(frame, k), light, 3e-5);
+    assert_near(seen.data[k], light, 3e-5);
+  }
+  clt_image_finish(&seen);
+}
+
 /* Every cell's light is mixed by the matrix before it reaches the surfaces. */
 static void crosstalk_mixes_channels(void **state) {
   (void)state;
   const double matrix[3][3] = {{0.9, 0.08, 0.02}, {0.0, 1.0, 0.125}, {0.03, 0.2, 0.7}};
-  rig_pair pair = wide_open("crosstalk = [0.9, 0.08, 0.02, 0.0, 1.0, 0.125, 0.03, 0.2, 0.7];", "cell_pixels = 1;",
-                            "ambient = 0.0;");
+  rig_pair pair = wide_open("crosstalk = [0.9, 0.08, 0.02, 0.0, 1.0, 0.125, 0.03, 0.2, 0.7];", "", "ambient = 0.0;");
   float codes[WIDE_VALUES];
-  double mixed[WIDE_VALUES] = {0};
-  wide_codes(codes);
+  double drive[WIDE_VALUES], mixed[WIDE_VALUES] = {0};
+  clt_frame frame = photograph(&pair, codes, drive);
   for (int k = 0; k < WIDE_VALUES; k++) {
     for (int from = 0; from < 3; from++) {
-      mixed[k] += matrix[k / WIDE_CELLS][from] * drive_of(codes[from * WIDE_CELLS + k % WIDE_CELLS]);
+      mixed[k] += matrix[k / WIDE_CELLS][from] * drive[from * WIDE_CELLS + k % WIDE_CELLS];
     }
   }
-  clt_frame frame = pair_frame(&pair, pair_show(&pair, codes) + SETTLED);
-  clt_image drive = {.channels = 3, .height = 4, .width = 6, .data = codes}, seen = {0};
-  clt_error error = {.status = CLT_OK};
-  assert_ok(clt_scene_appearance(pair.scene, &drive, &seen, &error), error);
-  for (int k = 0; k < WIDE_VALUES; k++) {
-    int cell = k % WIDE_CELLS;
-    double light = wide_light(mixed, k / WIDE_CELLS, cell);
-    assert_near(pixel(&frame, cell % 6, cell / 6, k / WIDE_CELLS), 20.0 / 60.0 * light, 1e-5);
-    assert_near(seen.data[k], light, 3e-5);
+  assert_shows(&pair, &frame, codes, mixed);
+  pair_close(&pair);
+}
+
+/* Share of a point's light k cells further on: the integral of the normal density over that cell. */
+static double spread(double sigma, int k) {
+  return 0.5 * (erf((k + 0.5) / (sigma * sqrt(2.0))) - erf((k - 0.5) / (sigma * sqrt(2.0))));
+}
+
+/* Light from value `from` of a line of count values to value `to`, reflected at both ends. */
+static double spread_within(double sigma, int count, int from, int to) {
+  double sum = 0.0;
+  for (int image = -9; image <= 9; image++) {
+    int there = 2 * count * image;
+    sum += spread(sigma, there + to - from) + spread(sigma, there + 2 * count - 1 - to - from);
   }
-  clt_image_finish(&seen);
+  return sum;
+}
+
+/* A plane blurred by the sum over mirror images, in double. */
+static void blur(double sigma, int width, int height, const double *in, double *out) {
+  for (int k = 0; k < width * height; k++) {
+    out[k] = 0.0;
+    for (int j = 0; j < width * height; j++) {
+      out[k] += in[j] * spread_within(sigma, width, j % width, k % width) *
+                spread_within(sigma, height, j / width, k / width);
+    }
+  }
+}
+
+static void defocus_spreads_drive(void **state) {
+  (void)state;
+  const double sigmas[] = {0.3, 0.8, 2.5};
+  for (int n = 0; n < 3; n++) {
+    char panel[60];
+    snprintf(panel, sizeof panel, "defocus = %.1f;", sigmas[n]);
+    rig_pair pair = wide_open(panel, "", "ambient = 0.0;");
+    float codes[WIDE_VALUES];
+    double drive[WIDE_VALUES], blurred[WIDE_VALUES], before = 0.0, after = 0.0;
+    clt_frame frame = photograph(&pair, codes, drive);
+    for (int c = 0; c < 3; c++) {
+      blur(sigmas[n], WIDE_WIDTH, WIDE_HEIGHT, &drive[c * WIDE_CELLS], &blurred[c * WIDE_CELLS]);
+    }
+    for (int k = 0; k < WIDE_VALUES; k++) {
+      before += drive[k];
+      after += blurred[k];
+    }
+    assert_near(after, before, 1e-12 * before);
+    for (int k = 0; k < WIDE_VALUES; k++) {
+      double light = wide_light(blurred, k / WIDE_CELLS, k % WIDE_CELLS);
+      assert_near(wide_seen(&frame, k), light, 3e-4 * light + 3e-5); /* cut off at 4 sigma: 1e-4 */
+    }
+    pair_close(&pair);
+  }
+}
+
+static void subsurface_spreads_radiance(void **state) {
+  (void)state;
+  rig_pair pair = wide_open("", "", "ambient = 0.0; subsurface = { share = 0.4; radius = 1.2; };");
+  float codes[WIDE_VALUES];
+  double drive[WIDE_VALUES], sharp[WIDE_VALUES], blurred[WIDE_VALUES];
+  clt_frame frame = photograph(&pair, codes, drive);
+  wide_radiance(codes, sharp);
+  for (int c = 0; c < 3; c++) {
+    blur(1.2, WIDE_WIDTH, WIDE_HEIGHT, &sharp[c * WIDE_CELLS], &blurred[c * WIDE_CELLS]);
+  }
+  for (int k = 0; k < WIDE_VALUES; k++) {
+    assert_near(wide_seen(&frame, k), 0.6 * sharp[k] + 0.4 * blurred[k], 2e-4);
+  }
+  pair_close(&pair);
+}
+
+static void lens_blur_spreads_pixels(void **state) {
+  (void)state;
+  enum { SIDE = 3, ACROSS = WIDE_WIDTH * SIDE, DOWN = WIDE_HEIGHT * SIDE };
+  rig_pair pair = wide_open("", "cell_pixels = 3; lens_blur = 1.7;", "ambient = 0.0;");
+  float codes[WIDE_VALUES];
+  double drive[WIDE_VALUES], radiance[WIDE_VALUES], sharp[ACROSS * DOWN], blurred[ACROSS * DOWN];
+  clt_frame frame = photograph(&pair, codes, drive);
+  wide_radiance(codes, radiance);
+  for (int c = 0; c < 3; c++) {
+    for (int p = 0; p < ACROSS * DOWN; p++) {
+      sharp[p] = radiance[c * WIDE_CELLS + p / ACROSS / SIDE * WIDE_WIDTH + p % ACROSS / SIDE];
+    }
+    blur(1.7, ACROSS, DOWN, sharp, blurred);
+    for (int p = 0; p < ACROSS * DOWN; p++) {
+      assert_near(wide_pixel(&frame, p % ACROSS, p / ACROSS, c), blurred[p], 2e-4);
+    }
+  }
   pair_close(&pair);
 }
 
@@ -106,22 +158,21 @@ static void crosstalk_mixes_channels(void **state) {
 static void vignetting_is_cos4(void **state) {
   (void)state;
   rig_pair pair = wide_open("", "cell_pixels = 5; vignetting = 0.4;", "ambient = 0.0;");
-  rig_pair bare = wide_open("", "cell_pixels = 5;", "ambient = 0.0;");
   float codes[WIDE_VALUES];
-  wide_codes(codes);
-  clt_frame frame = pair_frame(&pair, pair_show(&pair, codes) + SETTLED);
-  clt_frame plain = pair_frame(&bare, pair_show(&bare, codes) + SETTLED);
+  double drive[WIDE_VALUES], radiance[WIDE_VALUES];
+  clt_frame frame = photograph(&pair, codes, drive);
+  wide_radiance(codes, radiance);
   double corner = tan(acos(pow(0.6, 0.25))), diagonal = hypot(15.0, 10.0);
   for (int y = 0; y < 20; y++) {
     for (int x = 0; x < 30; x++) {
       double tangent = corner * hypot(x + 0.5 - 15.0, y + 0.5 - 10.0) / diagonal;
       for (int c = 0; c < 3; c++) {
-        assert_near(pixel(&frame, x, y, c), pow(cos(atan(tangent)), 4.0) * pixel(&plain, x, y, c), 2e-5);
+        double light = radiance[c * WIDE_CELLS + y / 5 * WIDE_WIDTH + x / 5];
+        assert_near(wide_pixel(&frame, x, y, c), pow(cos(atan(tangent)), 4.0) * light, 3e-5);
       }
     }
   }
   pair_close(&pair);
-  pair_close(&bare);
 }
 
 /* An effect at strength zero: its keys, by group. */
@@ -131,6 +182,15 @@ typedef struct absence {
 
 static const absence absences[] = {
     {"crosstalk", "crosstalk = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];", "", ""},
+    {"defocus", "defocus = 0.0;", "", ""},
+    {"subsurface", "", "", "subsurface = { share = 0.0; radius = 2.0; };"},
+    {"flicker", "", "", "flicker = { mains_hz = 60.0; depth = 0.0; };"},
+    {"drift", "drift = { per_hour = 0.0; amplitude = 0.0; period_s = 20.0; };", "", ""},
+    {"vibration", "", "", "vibration = { amplitude = [0.0, 0.0]; hz = 7.0; };"},
+    {"change", "", "", "change = { at_s = 0.05; cells = [1, 1, 2, 2]; factor = [1.0, 1.0, 1.0]; };"},
+    {"rolling-shutter", "", "line_us = 0.0;", ""},
+    {"faults", "", "faults = { dropped = 0.0; stuck = 0.0; late = 0.0; late_ms = 70.0; };", ""},
+    {"lens-blur", "", "lens_blur = 0.0;", ""},
     {"vignetting", "", "vignetting = 0.0;", ""},
 };
 
@@ -189,7 +249,7 @@ static float diagonal_entry(int channel, size_t row, size_t column) {
 static void diagonal_light(void **state) {
   (void)state;
   room made;
-  room_make(&made, "transport_file = \"t.h5\"; projector = { " PLAIN_PANEL " }; camera = { " PLAIN_CAMERA " };");
+  room_make(&made, "transport_file = \"t.h5\"; projector = { " WIDE_PANEL " }; camera = { " WIDE_CAMERA " };");
   room_add_transport(&made, 6, 4, 3, diagonal_entry, 0.125f);
   rig_pair pair = pair_of(room_open(&made));
   room_remove(&made);
@@ -200,17 +260,17 @@ static void diagonal_light(void **state) {
   for (int k = 0; k < WIDE_VALUES; k++) {
     int cell = k % WIDE_CELLS, c = k / WIDE_CELLS;
     double entry = (double)diagonal_entry(c, (size_t)cell, (size_t)cell);
-    assert_near(pixel(&frame, 2 * (cell % 6), 2 * (cell / 6), c), 20.0 / 60.0 * (0.127 + entry * drive_of(codes[k])),
-                1e-5);
+    assert_near(wide_seen(&frame, k), 0.127 + entry * wide_drive(codes[k]), 3e-5);
   }
   pair_close(&pair);
 }
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(pipeline_in_double), cmocka_unit_test(crosstalk_mixes_channels),
-      cmocka_unit_test(vignetting_is_cos4), cmocka_unit_test(no_strength_no_difference),
-      cmocka_unit_test(diagonal_light),
+      cmocka_unit_test(pipeline_in_double),        cmocka_unit_test(crosstalk_mixes_channels),
+      cmocka_unit_test(defocus_spreads_drive),     cmocka_unit_test(subsurface_spreads_radiance),
+      cmocka_unit_test(lens_blur_spreads_pixels),  cmocka_unit_test(vignetting_is_cos4),
+      cmocka_unit_test(no_strength_no_difference), cmocka_unit_test(diagonal_light),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -29,6 +29,11 @@ typedef struct clt_exposure {
   float *scratch; /* as large; there where a stage has `expose` */
 } clt_exposure;
 
+/* Row y of a channel. */
+static inline float *clt_exposure_row(const clt_exposure *exposure, int channel, int y) {
+  return &exposure->radiance[((size_t)channel * (size_t)exposure->height + (size_t)y) * (size_t)exposure->width];
+}
+
 /* What reaches the sensor: radiance[(c * height + y) * width + x], of a pixel where an effect tells pixels of a cell
  * apart, else of a cell, or of a row of a cell's pixels. */
 typedef struct clt_signal {
@@ -76,11 +81,11 @@ struct clt_effect {
   clt_status (*prepare)(clt_scene *scene, clt_stage *stage, clt_error *error);
   void (*finish)(
       void *state); /* frees the state, also a half-built one and NULL; NULL: the state belongs to the scene */
-  /* Changes the drive of the cells, channels * cells values; scratch is as large. */
+  /* Changes the drive of the cells, channels * cells values; scratch is twice as large. */
   void (*drive)(const void *state, float *drive, float *scratch);
   /* radiance = b0 + T drive. Without such a stage T is diagonal. */
   void (*light)(void *state, const float *drive, float *radiance);
-  /* Changes the radiance of the cells, channels * cells values; scratch is as large. */
+  /* Changes the radiance of the cells, channels * cells values; scratch is twice as large. */
   void (*radiance)(const void *state, float *radiance, float *scratch);
   /* Decides what becomes of frame number `sequence`; fate was zeroed by the caller. */
   void (*frame)(const void *state, uint32_t sequence, clt_fate *fate);

@@ -56,7 +56,7 @@ static clt_status init(clt_scene *scene, bench *b, clt_error *error) {
   *b = (bench){.scene = scene, .values = scene->plan.values, .samples = scene->plan.values * side * side};
   b->cells = clt_alloc(2 * b->values, sizeof *b->cells);
   b->radiance = clt_alloc(b->samples, sizeof *b->radiance);
-  b->scratch = clt_alloc(b->samples, sizeof *b->scratch);
+  b->scratch = clt_alloc(2 * b->samples, sizeof *b->scratch);
   b->electrons = clt_alloc(b->samples, sizeof *b->electrons);
   b->none = clt_alloc(b->samples, sizeof *b->none);
   b->bands = clt_alloc((size_t)description->height * side, sizeof *b->bands);

@@ -100,7 +100,7 @@ clt_status clt_plan_compile(clt_scene *scene, clt_error *error) {
     status = take_diagonal(scene, error);
   }
   if (status == CLT_OK && clt_plan_any(plan, changes_light)) {
-    plan->work = clt_alloc(2 * plan->values, sizeof *plan->work);
+    plan->work = clt_alloc(3 * plan->values, sizeof *plan->work);
     if (plan->work == NULL) {
       return out_of_memory(scene, error);
     }

@@ -10,7 +10,7 @@ typedef struct clt_plan {
   size_t values;           /* channels * cells */
   bool per_row, per_pixel; /* of any stage */
   float *diagonal;         /* values entries of a diagonal T; NULL where a stage has `light` */
-  float *work, *scratch;   /* values each; there where a stage has `drive` or `radiance` */
+  float *work, *scratch;   /* values and 2 * values; there where a stage has `drive` or `radiance` */
 } clt_plan;
 
 /* Reads the keys of every effect. */
@@ -27,8 +27,8 @@ bool clt_effect_has_expose(const clt_effect *effect);
 bool clt_effect_has_signal(const clt_effect *effect);
 bool clt_effect_has_electrons(const clt_effect *effect);
 
-/* What the panel's drive becomes on its way to the surfaces, in place; scratch: values entries, or NULL where no stage
- * has `drive` or `radiance`. */
+/* What the panel's drive becomes on its way to the surfaces, in place; scratch: 2 * values entries, or NULL where no
+ * stage has `drive` or `radiance`. */
 void clt_plan_drive(const clt_plan *plan, float *drive, float *scratch);
 /* What happens to the radiance of the surfaces on its way to the camera, in place. */
 void clt_plan_radiance(const clt_plan *plan, float *radiance, float *scratch);
