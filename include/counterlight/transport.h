@@ -67,9 +67,9 @@ CLT_PUBLIC void clt_transport_destroy(clt_transport *transport);
 
 /* Reads and writes docs/transport-file.md. Loading refuses (CLT_BAD_INPUT, naming file and field) what is missing,
  * truncated, damaged, of a wrong size, NaN or infinite (but a sigma may be: a cell never seen), or negative beyond
- * noise (an entry below -1e-2 of the largest). It reads the file in a child process first, because HDF5 breaks down on
- * some damaged files: a program that loads while its other threads compute should know that this forks. Saving writes a
- * temporary file in the same folder, syncs it and renames it over `path`. */
+ * noise (an entry below -1e-2 of the largest). HDF5 1.10 trusts a file's structure and does not survive every flipped
+ * byte: a program that must not end by that tries the file in a process of its own first, as counterlightd does. Saving
+ * writes a temporary file in the same folder, syncs it and renames it over `path`. */
 CLT_PUBLIC clt_status clt_transport_load(const char *path, clt_transport **out, clt_error *error);
 CLT_PUBLIC clt_status clt_transport_save(const clt_transport *transport, const char *path, clt_error *error);
 

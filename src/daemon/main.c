@@ -14,6 +14,7 @@
 #include "daemon/measure.h"
 #include "daemon/options.h"
 #include "daemon/output.h"
+#include "daemon/probe.h"
 #include "daemon/solver.h"
 
 enum { EXIT_BAD_INPUT = 2 };
@@ -148,6 +149,9 @@ int main(int count, char **arguments) {
   if (options.states) {
     machine_print(stdout);
     return EXIT_SUCCESS;
+  }
+  if (options.transport != NULL) {
+    return probe_run(options.transport);
   }
   block_signals();
   if (daemon_config_read(options.config, &options.overrides, &config, &error) != CLT_OK) {

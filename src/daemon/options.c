@@ -5,10 +5,15 @@
 
 bool daemon_options_read(int count, char **arguments, daemon_options *options) {
   static const struct option known[] = {
-      {"config", required_argument, NULL, 'c'}, {"socket", required_argument, NULL, 's'},
-      {"state", required_argument, NULL, 'd'},  {"check", no_argument, NULL, 'k'},
-      {"states", no_argument, NULL, 'g'},       {"help", no_argument, NULL, 'h'},
-      {"version", no_argument, NULL, 'V'},      {NULL, 0, NULL, 0},
+      {"config", required_argument, NULL, 'c'},
+      {"socket", required_argument, NULL, 's'},
+      {"state", required_argument, NULL, 'd'},
+      {"check", no_argument, NULL, 'k'},
+      {"states", no_argument, NULL, 'g'},
+      {"help", no_argument, NULL, 'h'},
+      {"version", no_argument, NULL, 'V'},
+      {"try-transport", required_argument, NULL, 't'},
+      {NULL, 0, NULL, 0},
   };
   *options = (daemon_options){0};
   for (int letter; (letter = getopt_long(count, arguments, "c:hV", known, NULL)) != -1;) {
@@ -31,6 +36,9 @@ bool daemon_options_read(int count, char **arguments, daemon_options *options) {
     case 'h':
       options->help = true;
       break;
+    case 't':
+      options->transport = optarg;
+      break;
     case 'V':
       options->version = true;
       break;
@@ -38,7 +46,7 @@ bool daemon_options_read(int count, char **arguments, daemon_options *options) {
       return false;
     }
   }
-  bool needs_config = !options->states && !options->help && !options->version;
+  bool needs_config = !options->states && !options->help && !options->version && options->transport == NULL;
   if (optind < count || (needs_config && options->config == NULL)) {
     fprintf(stderr, "counterlightd: %s; see counterlightd --help\n",
             optind < count ? "takes no arguments but options" : "needs --config FILE");
@@ -55,6 +63,8 @@ void daemon_options_help(void) {
        "      --socket PATH   control socket, in place of the configuration's\n"
        "      --state DIR     state directory, in place of the configuration's\n"
        "      --states        print the state machine as a Graphviz digraph and end\n"
+       "      --try-transport FILE\n"
+       "                      load a transport and end: 0 where it is whole, else 2\n"
        "  -h, --help\n"
        "  -V, --version\n\n"
        "Exit: 0 stopped by a signal; 1 failed; 2 bad usage or configuration.");

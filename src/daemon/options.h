@@ -8,6 +8,7 @@
 
 typedef struct daemon_options {
   const char *config;
+  const char *transport; /* to try, as the daemon itself asks for; NULL: not asked */
   daemon_overrides overrides;
   bool check, states, help, version;
 } daemon_options;

@@ -15,6 +15,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/places.h"
+#include "daemon/probe.h"
 
 static const char transport_name[] = "transport.h5", drive_name[] = "drive.npy", record_name[] = "state.json";
 
@@ -154,7 +155,12 @@ clt_transport *store_load_transport(const store *state, int width, int height, i
   if (store_path(state, transport_name, path, &error) != CLT_OK || access(path, F_OK) != 0) {
     return NULL;
   }
-  if (clt_transport_load(path, &transport, &error) != CLT_OK) {
+  if (!probe_transport(path)) {
+    clt_fail(&error, CLT_BAD_INPUT, "%s: is damaged, reading it breaks down", path);
+  } else {
+    clt_transport_load(path, &transport, &error);
+  }
+  if (error.status != CLT_OK) {
     clt_log(CLT_LOG_ERROR, "the stored transport cannot be used: %s", error.message);
     snprintf(suffix, sizeof suffix, "bad-%lld", (long long)time(NULL));
     set_aside(path, suffix);

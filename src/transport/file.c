@@ -4,12 +4,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "base/file.h"
 #include "transport/check.h"
 #include "transport/kind.h"
-#include "transport/rehearsal.h"
 
 static const char format_name[] = "counterlight-transport";
 enum { FORMAT_VERSION = 1 };
@@ -228,45 +226,24 @@ static clt_status read_transport(const clt_hdf *hdf, clt_transport **out, clt_er
   return status;
 }
 
-typedef struct reading {
-  const char *path;
-  clt_transport *transport; /* also what is there of it after a failure */
-} reading;
-
-static clt_status read_file(void *context, clt_error *error) {
-  reading *task = context;
+clt_status clt_transport_load(const char *path, clt_transport **out, clt_error *error) {
   clt_hdf hdf;
-  clt_status status = clt_hdf_open(task->path, &hdf, error);
+  clt_transport *transport = NULL; /* also what is there of it after a failure */
+  clt_hdf_session session = clt_hdf_enter();
+  clt_status status = clt_hdf_open(path, &hdf, error);
   if (status == CLT_OK) {
-    status = read_transport(&hdf, &task->transport, error);
+    status = read_transport(&hdf, &transport, error);
   }
   clt_hdf_close(&hdf);
-  return status;
-}
-
-/* Processor time that reading a file may take: far more than it ever does. */
-static unsigned patience(const char *path) {
-  struct stat about;
-  return 3 + (stat(path, &about) == 0 ? (unsigned)(about.st_size >> 24) : 0);
-}
-
-clt_status clt_transport_load(const char *path, clt_transport **out, clt_error *error) {
-  reading task = {.path = path};
-  clt_hdf_session session = clt_hdf_enter();
-  /* HDF5 1.10 trusts a file's structure: a few flipped bits can crash it or keep it busy for ever. */
-  clt_status status = clt_rehearse(read_file, &task, path, patience(path), error);
-  if (status == CLT_OK) {
-    status = read_file(&task, error);
-  }
   clt_hdf_leave(session);
   if (status == CLT_OK) {
-    status = check_values(task.transport, path, error);
+    status = check_values(transport, path, error);
   }
   if (status != CLT_OK) {
-    clt_transport_destroy(task.transport);
-    task.transport = NULL;
+    clt_transport_destroy(transport);
+    transport = NULL;
   }
-  *out = task.transport;
+  *out = transport;
   return status;
 }
 

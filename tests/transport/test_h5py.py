@@ -337,19 +337,6 @@ class Refused(Case):
 
 
 class Damaged(Case):
-    def test_heap(self):
-        """The heap of strings has no check sum: HDF5 1.10 itself crashes or hangs over some of these."""
-        write(self.path, entries(), source='a scene')
-        with open(self.path, 'rb') as file:
-            whole = file.read()
-        heap = whole.index(b'GCOL')
-        for place in range(heap, heap + 64, 3):
-            for value in (0x81, 0xff):
-                with open(self.path, 'wb') as file:
-                    file.write(whole[:place] + bytes([value]) + whole[place + 1:])
-                code, answer = show(self.path)
-                self.assertIn(code, (0, 2), (place - heap, value, answer))
-
     def test_truncated(self):
         write(self.path, entries())
         with open(self.path, 'rb') as file:
