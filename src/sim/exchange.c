@@ -43,8 +43,8 @@ static double visible_fraction(const clt_parts *parts, int i, int j) {
     for (int d = 0; d < 4; d++) {
       at[d] = fraction((d + 1) * begin + k * step[d]);
     }
-    clt_vector from = vec_along(a->corner, at[0], a->u, at[1], a->v);
-    clt_vector to = vec_along(b->corner, at[2], b->u, at[3], b->v);
+    clt_vector from = clt_rectangle_point(a, at[0], at[1]);
+    clt_vector to = clt_rectangle_point(b, at[2], at[3]);
     open += !clt_visibility_blocked(parts->visibility, from, to, parts->surface[i], parts->surface[j]);
   }
   return open / (double)SEGMENTS;

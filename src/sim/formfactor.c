@@ -48,14 +48,14 @@ static int cut(clt_vector origin, clt_vector normal, const clt_vector *vertices,
   return left;
 }
 
-double clt_formfactor_point(clt_vector point, clt_vector normal, const clt_vector vertices[4],
+double clt_formfactor_point(clt_vector point, clt_vector normal, const clt_vector *vertices, int count,
                             clt_vector plane_normal) {
   clt_vector kept[POLYGON_MAX];
   if (vec_dot(plane_normal, vec_sub(point, vertices[0])) <= 0.0) {
     return 0.0;
   }
-  int count = cut(point, normal, vertices, 4, kept);
-  return count >= 3 ? contour_sum(normal, kept, count) : 0.0;
+  int above = cut(point, normal, vertices, count, kept);
+  return above >= 3 ? contour_sum(normal, kept, above) : 0.0;
 }
 
 /* Gauss-Legendre rules on 0..1. */
@@ -81,20 +81,24 @@ static const struct quadrature *choose_quadrature(const clt_rectangle *a, const 
   double size = fmax(fmax(vec_length(a->u), vec_length(a->v)), fmax(vec_length(b->u), vec_length(b->v)));
   double distance = vec_length(vec_sub(clt_rectangle_centre(b), clt_rectangle_centre(a)));
   for (int k = 0; k < QUADRATURES; k++) {
-    if (distance >= quadratures[k].farther_than * size) {
+    bool serves = quadratures[k].order > 1 || !a->triangle; /* one point would miss a triangle's middle */
+    if (serves && distance >= quadratures[k].farther_than * size) {
       return &quadratures[k];
     }
   }
   return NULL;
 }
 
-static double integrate_points(const clt_rectangle *a, const clt_rectangle *b, const clt_vector vertices[4],
+/* Over a triangle the points are those of a square with one side drawn together (Duffy 1982). */
+static double integrate_points(const clt_rectangle *a, const clt_rectangle *b, const clt_vector *vertices,
                                const struct quadrature *rule) {
   double sum = 0.0;
   for (int p = 0; p < rule->order; p++) {
     for (int q = 0; q < rule->order; q++) {
-      clt_vector point = vec_along(a->corner, rule->at[p], a->u, rule->at[q], a->v);
-      sum += rule->weight[p] * rule->weight[q] * clt_formfactor_point(point, a->normal, vertices, b->normal);
+      double t = rule->at[q], across = a->triangle ? 1.0 - t : 1.0, weight = rule->weight[p] * rule->weight[q];
+      clt_vector point = vec_along(a->corner, rule->at[p] * across, a->u, t, a->v);
+      weight *= a->triangle ? 2.0 * across : 1.0;
+      sum += weight * clt_formfactor_point(point, a->normal, vertices, clt_rectangle_vertices(b), b->normal);
     }
   }
   return clt_rectangle_area(a) * sum;
@@ -161,8 +165,8 @@ static double integrate_contours(const clt_vector *a, int count_a, const clt_vec
 }
 
 /* True where some vertex lies behind the plane of `plane`. */
-static bool reaches_behind(const clt_vector vertices[4], const clt_rectangle *plane) {
-  for (int k = 0; k < 4; k++) {
+static bool reaches_behind(const clt_vector *vertices, int count, const clt_rectangle *plane) {
+  for (int k = 0; k < count; k++) {
     if (vec_dot(plane->normal, vec_sub(vertices[k], plane->corner)) < 0.0) {
       return true;
     }
@@ -176,12 +180,13 @@ double clt_formfactor_exchange(const clt_rectangle *a, const clt_rectangle *b) {
     corners_a[k] = clt_rectangle_vertex(a, k);
     corners_b[k] = clt_rectangle_vertex(b, k);
   }
+  int vertices_a = clt_rectangle_vertices(a), vertices_b = clt_rectangle_vertices(b);
   const struct quadrature *rule = choose_quadrature(a, b);
-  if (rule != NULL && !reaches_behind(corners_a, b)) {
+  if (rule != NULL && !reaches_behind(corners_a, vertices_a, b)) {
     return integrate_points(a, b, corners_b, rule);
   }
-  int count_a = cut(b->corner, b->normal, corners_a, 4, kept_a);
-  int count_b = cut(a->corner, a->normal, corners_b, 4, kept_b);
+  int count_a = cut(b->corner, b->normal, corners_a, vertices_a, kept_a);
+  int count_b = cut(a->corner, a->normal, corners_b, vertices_b, kept_b);
   if (count_a < 3 || count_b < 3) {
     return 0.0;
   }

@@ -6,24 +6,42 @@ static const double TOUCHING = 1e-9;
 bool clt_rectangle_complete(clt_rectangle *rectangle) {
   clt_vector across = vec_cross(rectangle->u, rectangle->v);
   double u = vec_length(rectangle->u), v = vec_length(rectangle->v), area = vec_length(across);
-  if (!(u > 1e-6 && v > 1e-6) || fabs(vec_dot(rectangle->u, rectangle->v)) > 1e-6 * u * v) {
+  bool skewed = fabs(vec_dot(rectangle->u, rectangle->v)) > 1e-6 * u * v;
+  if (!(u > 1e-6 && v > 1e-6 && area > 1e-6 * u * v) || (skewed && !rectangle->triangle)) {
     return false;
   }
   rectangle->normal = vec_scale(1.0 / area, across);
   return true;
 }
 
+int clt_rectangle_vertices(const clt_rectangle *rectangle) {
+  return rectangle->triangle ? 3 : 4;
+}
+
 clt_vector clt_rectangle_vertex(const clt_rectangle *rectangle, int number) {
-  double s = number == 1 || number == 2, t = number >= 2;
+  double s = number == 1 || (number == 2 && !rectangle->triangle), t = number >= 2;
   return vec_along(rectangle->corner, s, rectangle->u, t, rectangle->v);
 }
 
 double clt_rectangle_area(const clt_rectangle *rectangle) {
-  return vec_length(rectangle->u) * vec_length(rectangle->v);
+  return rectangle->triangle ? 0.5 * vec_length(vec_cross(rectangle->u, rectangle->v))
+                             : vec_length(rectangle->u) * vec_length(rectangle->v);
 }
 
 clt_vector clt_rectangle_centre(const clt_rectangle *rectangle) {
-  return vec_along(rectangle->corner, 0.5, rectangle->u, 0.5, rectangle->v);
+  double middle = rectangle->triangle ? 1.0 / 3.0 : 0.5;
+  return vec_along(rectangle->corner, middle, rectangle->u, middle, rectangle->v);
+}
+
+clt_vector clt_rectangle_point(const clt_rectangle *rectangle, double s, double t) {
+  bool fold = rectangle->triangle && s + t > 1.0; /* the other half of the parallelogram, turned around */
+  return vec_along(rectangle->corner, fold ? 1.0 - s : s, rectangle->u, fold ? 1.0 - t : t, rectangle->v);
+}
+
+/* p . u' / (u . u') with u' = u less its part along v: s of a point p = s u + t v. */
+static double coordinate(clt_vector p, clt_vector u, clt_vector v) {
+  clt_vector only = vec_along(u, -vec_dot(u, v) / vec_dot(v, v), v, 0.0, v);
+  return vec_dot(p, only) / vec_dot(u, only);
 }
 
 clt_hit clt_hit_on_plane(const clt_rectangle *rectangle, clt_vector origin, clt_vector direction) {
@@ -31,8 +49,8 @@ clt_hit clt_hit_on_plane(const clt_rectangle *rectangle, clt_vector origin, clt_
   clt_hit hit = {.front = slope < 0.0};
   hit.distance = vec_dot(rectangle->normal, vec_sub(rectangle->corner, origin)) / slope;
   clt_vector at = vec_sub(vec_add(origin, vec_scale(hit.distance, direction)), rectangle->corner);
-  hit.s = vec_dot(at, rectangle->u) / vec_dot(rectangle->u, rectangle->u);
-  hit.t = vec_dot(at, rectangle->v) / vec_dot(rectangle->v, rectangle->v);
+  hit.s = coordinate(at, rectangle->u, rectangle->v);
+  hit.t = coordinate(at, rectangle->v, rectangle->u);
   return hit;
 }
 
@@ -41,7 +59,7 @@ clt_hit clt_hit_on_plane(const clt_rectangle *rectangle, clt_vector origin, clt_
 static bool meet(const clt_rectangle *rectangle, clt_vector origin, clt_vector direction, clt_hit *hit) {
   *hit = clt_hit_on_plane(rectangle, origin, direction);
   return isfinite(hit->distance) && hit->distance > TOUCHING && hit->s >= 0.0 && hit->s <= 1.0 && hit->t >= 0.0 &&
-         hit->t <= 1.0;
+         hit->t <= 1.0 && (!rectangle->triangle || hit->s + hit->t <= 1.0);
 }
 
 clt_hit clt_first_hit(const clt_rectangle *rectangles, int count, clt_vector origin, clt_vector direction,
@@ -72,7 +90,7 @@ bool clt_segment_blocked(const clt_rectangle *rectangles, int count, clt_vector 
 static int sides(const clt_rectangle *plane, const clt_rectangle *of) {
   double reach = vec_length(of->u) + vec_length(of->v) + vec_length(vec_sub(of->corner, plane->corner));
   int found = 0;
-  for (int k = 0; k < 4; k++) {
+  for (int k = 0; k < clt_rectangle_vertices(of); k++) {
     double height = vec_dot(plane->normal, vec_sub(clt_rectangle_vertex(of, k), plane->corner));
     found |= height > TOUCHING * reach ? 1 : height < -TOUCHING * reach ? 2 : 0;
   }

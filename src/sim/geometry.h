@@ -35,20 +35,27 @@ static inline clt_vector vec_unit(clt_vector a) {
   return vec_scale(1.0 / vec_length(a), a);
 }
 
-/* The points corner + s u + t v, 0 <= s, t <= 1, with u perpendicular to v. The side that u x v points to reflects
- * diffusely; the back is black, but blocks light. */
+/* A flat piece of surface: the points corner + s u + t v, 0 <= s, t <= 1, with u perpendicular to v; or the triangle of
+ * those with s + t <= 1, whose u and v may stand at any angle. The side that u x v points to reflects diffusely; the
+ * back is black, but blocks light. */
 typedef struct clt_rectangle {
   clt_vector corner, u, v;
+  bool triangle;
   clt_vector normal; /* unit, along u x v */
   double albedo[3];  /* per channel, 0 <= albedo < 1 */
 } clt_rectangle;
 
-/* Fills normal from u and v; false where they span no area or are not perpendicular (to 1e-6). */
+/* Fills normal from u and v; false where they span no area, or no rectangle (to 1e-6) and it is not a triangle. */
 bool clt_rectangle_complete(clt_rectangle *rectangle);
-/* Corner number 0..3 in the order corner, +u, +u+v, +v: counter-clockwise seen from the front. */
+/* 4, or 3 of a triangle. */
+int clt_rectangle_vertices(const clt_rectangle *rectangle);
+/* Corner number 0..3 in the order corner, +u, +u+v, +v: counter-clockwise seen from the front. A triangle has no +u+v,
+ * and its last corner also as number 3. */
 clt_vector clt_rectangle_vertex(const clt_rectangle *rectangle, int number);
 double clt_rectangle_area(const clt_rectangle *rectangle);
 clt_vector clt_rectangle_centre(const clt_rectangle *rectangle);
+/* Covers it evenly as s and t go evenly over 0..1. */
+clt_vector clt_rectangle_point(const clt_rectangle *rectangle, double s, double t);
 
 typedef struct clt_hit {
   int surface;     /* index into the rectangles; -1: nothing was met */

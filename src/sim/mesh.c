@@ -5,9 +5,11 @@
 
 #include "base/memory.h"
 
-/* How each surface is divided: columns x rows elements from number first on, before the lit ones are put last. */
+/* How each surface is divided: columns x rows elements from number first on, before the lit ones are put last. A
+ * triangle has as many columns as rows: row r holds columns - r upright triangles with turned ones between them. */
 typedef struct division {
   int columns, rows, first;
+  bool triangle;
 } division;
 
 static void trace(clt_mesh *mesh, const clt_scene_description *description, const clt_visibility *visibility) {
@@ -67,7 +69,10 @@ static int divide(const clt_scene_description *description, double side, divisio
     const clt_rectangle *surface = &description->surfaces[k];
     double columns = fmin(fmax(1.0, ceil(vec_length(surface->u) / side - 1e-9)), CLT_ELEMENTS_MAX);
     double rows = fmin(fmax(1.0, ceil(vec_length(surface->v) / side - 1e-9)), CLT_ELEMENTS_MAX);
-    divisions[k] = (division){.columns = (int)columns, .rows = (int)rows, .first = count};
+    if (surface->triangle) {
+      columns = rows = fmax(columns, rows);
+    }
+    divisions[k] = (division){(int)columns, (int)rows, count, surface->triangle};
     count = columns * rows + count > CLT_ELEMENTS_MAX ? CLT_ELEMENTS_MAX + 1 : count + (int)(columns * rows);
   }
   return count;
@@ -88,10 +93,42 @@ static int choose_division(const clt_scene_description *description, double foot
   return count;
 }
 
+/* The number of a triangle's first element in row `row`. */
+static int row_start(const division *of, int row) {
+  return row * (2 * of->columns - row);
+}
+
 static int element_at(const division *of, double s, double t) {
-  int column = (int)fmin(fmax(s, 0.0) * of->columns, of->columns - 1);
-  int row = (int)fmin(fmax(t, 0.0) * of->rows, of->rows - 1);
-  return of->first + row * of->columns + column;
+  double x = fmax(s, 0.0) * of->columns, y = fmax(t, 0.0) * of->rows;
+  int row = (int)fmin(y, of->rows - 1);
+  if (!of->triangle) {
+    return of->first + row * of->columns + (int)fmin(x, of->columns - 1);
+  }
+  int last = of->columns - 1 - row, column = (int)fmin(x, last);
+  bool turned = column < last && (x - column) + (y - row) > 1.0;
+  return of->first + row_start(of, row) + 2 * column + turned;
+}
+
+/* Element number `number` of a surface, counted from its first. */
+static clt_rectangle part_of(const clt_rectangle *whole, const division *by, int number) {
+  clt_rectangle part = *whole;
+  part.u = vec_scale(1.0 / by->columns, whole->u);
+  part.v = vec_scale(1.0 / by->rows, whole->v);
+  int row = number / by->columns, column = number % by->columns;
+  if (by->triangle) {
+    for (row = 0; row_start(by, row + 1) <= number;) {
+      row++;
+    }
+    bool turned = (number - row_start(by, row)) % 2 != 0;
+    column = (number - row_start(by, row)) / 2 + turned;
+    row += turned;
+    if (turned) {
+      part.u = vec_scale(-1.0, part.u);
+      part.v = vec_scale(-1.0, part.v);
+    }
+  }
+  part.corner = vec_along(whole->corner, column / (double)by->columns, whole->u, row / (double)by->rows, whole->v);
+  return part;
 }
 
 /* Numbers the elements: place[old] = new, lit ones last. */
@@ -122,11 +159,7 @@ static void place_elements(clt_mesh *mesh, const clt_scene_description *descript
     const clt_rectangle *whole = &description->surfaces[k];
     const division *by = &divisions[k];
     for (int e = 0; e < by->columns * by->rows; e++) {
-      clt_rectangle part = *whole;
-      part.u = vec_scale(1.0 / by->columns, whole->u);
-      part.v = vec_scale(1.0 / by->rows, whole->v);
-      part.corner = vec_along(whole->corner, e % by->columns, part.u, e / by->columns, part.v);
-      mesh->elements[place[by->first + e]] = part;
+      mesh->elements[place[by->first + e]] = part_of(whole, by, e);
       mesh->surface[place[by->first + e]] = k;
     }
   }

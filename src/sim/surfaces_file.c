@@ -1,5 +1,7 @@
 #include <string.h>
 
+#include "base/file.h"
+#include "sim/mesh_file.h"
 #include "sim/scene_file.h"
 #include "sim/shapes.h"
 
@@ -111,10 +113,30 @@ static bool read_cylinder(clt_section item, const double *albedo, clt_scene_desc
   return clt_shape_cylinder(description, &cylinder, read_facing(item), albedo);
 }
 
+/* What is wrong with the file is kept here. */
+static bool read_mesh(clt_section item, const double *albedo, clt_scene_description *description) {
+  char folder[CLT_PATH_MAX], path[CLT_PATH_MAX];
+  clt_mesh_place place = {.at = clt_scene_read_vector(item, "at", (clt_vector){0.0, 0.0, 0.0}),
+                          .scale = clt_read_number(item, "scale", 1.0, 1e-6, 1e6)};
+  clt_facing facing = read_facing(item);
+  const char *name = clt_read_text(item, "file", NULL, CLT_PATH_MAX - 1);
+  if (name == NULL) {
+    clt_section_fail(item, NULL, "a mesh needs file = \"...\"");
+    return true;
+  }
+  clt_error wrong = {.status = CLT_OK};
+  clt_file_folder(description->path, folder);
+  if (clt_file_join(folder, name, path, &wrong) != CLT_OK ||
+      clt_mesh_file_add(description, path, &place, facing, albedo, &wrong) != CLT_OK) {
+    clt_section_fail(item, "file", "%s", wrong.message);
+  }
+  return true;
+}
+
 static const struct type {
   const char *name;
   bool (*read)(clt_section item, const double *albedo, clt_scene_description *description);
-} types[] = {{"rectangle", read_rectangle}, {"box", read_box}, {"cylinder", read_cylinder}};
+} types[] = {{"rectangle", read_rectangle}, {"box", read_box}, {"cylinder", read_cylinder}, {"mesh", read_mesh}};
 enum { TYPES = sizeof types / sizeof types[0] };
 
 static void read_surface(clt_section item, const material *materials, int count, clt_scene_description *description) {

@@ -76,8 +76,8 @@ static void point_above_corner(void **state) {
     double closed = (A / A1 * atan(B / A1) + B / B1 * atan(A / B1)) / (2 * M_PI);
     clt_vector vertices[4] = {{0, 0, 0}, {1.5, 0, 0}, {1.5, 0.7, 0}, {0, 0.7, 0}};
     clt_vector above = {0, 0, heights[k]}, down = {0, 0, -1}, up = {0, 0, 1};
-    assert_near(clt_formfactor_point(above, down, vertices, up), closed, 1e-8 * closed);
-    assert_near(clt_formfactor_point(above, down, vertices, down), 0.0, 0.0);
+    assert_near(clt_formfactor_point(above, down, vertices, 4, up), closed, 1e-8 * closed);
+    assert_near(clt_formfactor_point(above, down, vertices, 4, down), 0.0, 0.0);
   }
 }
 
@@ -87,11 +87,11 @@ static void horizon_cuts(void **state) {
   clt_vector whole[4] = {{2, -1, -3}, {2, -1, 2}, {2, 1, 2}, {2, 1, -3}};
   clt_vector upper[4] = {{2, -1, 0}, {2, -1, 2}, {2, 1, 2}, {2, 1, 0}};
   clt_vector origin = {0, 0, 0}, up = {0, 0, 1}, facing = {-1, 0, 0};
-  double wanted = clt_formfactor_point(origin, up, upper, facing);
+  double wanted = clt_formfactor_point(origin, up, upper, 4, facing);
   assert_true(wanted > 0.05);
-  assert_near(clt_formfactor_point(origin, up, whole, facing), wanted, 1e-12);
+  assert_near(clt_formfactor_point(origin, up, whole, 4, facing), wanted, 1e-12);
   clt_vector tilted = vec_unit((clt_vector){-0.9, 0.3, -0.2});
-  assert_near(clt_formfactor_point(origin, tilted, upper, facing), 0.0, 0.0);
+  assert_near(clt_formfactor_point(origin, tilted, upper, 4, facing), 0.0, 0.0);
 }
 
 int main(void) {
