@@ -101,6 +101,9 @@ struct clt_effect {
   bool per_pixel; /* the pixels of a cell differ */
 };
 
+/* The `prepare` of effects whose state is the scene's description. */
+clt_status clt_effect_lend_description(clt_scene *scene, clt_stage *stage, clt_error *error);
+
 /* Every effect, in the order in which light meets them. */
 extern const clt_effect *const clt_effects[CLT_EFFECTS];
 

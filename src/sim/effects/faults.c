@@ -28,12 +28,6 @@ static bool called_for(const clt_scene *scene, char *why) {
   return on;
 }
 
-static clt_status prepare(clt_scene *scene, clt_stage *stage, clt_error *error) {
-  (void)error;
-  stage->state = &scene->description;
-  return CLT_OK;
-}
-
 static void frame(const void *state, uint32_t sequence, clt_fate *fate) {
   const clt_scene_description *description = state;
   const clt_faults_description *faults = &description->effects.faults;
@@ -44,4 +38,4 @@ static void frame(const void *state, uint32_t sequence, clt_fate *fate) {
 }
 
 const clt_effect clt_effect_faults = {
-    .name = "faults", .read = read, .called_for = called_for, .prepare = prepare, .frame = frame};
+    .name = "faults", .read = read, .called_for = called_for, .prepare = clt_effect_lend_description, .frame = frame};

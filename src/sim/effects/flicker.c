@@ -22,12 +22,6 @@ static bool called_for(const clt_scene *scene, char *why) {
   return flicker->depth > 0.0 && light;
 }
 
-static clt_status prepare(clt_scene *scene, clt_stage *stage, clt_error *error) {
-  (void)error;
-  stage->state = &scene->description;
-  return CLT_OK;
-}
-
 static void expose(const void *state, clt_exposure *exposure, const clt_band *band) {
   const clt_scene_description *description = state;
   const clt_flicker_description *flicker = &description->effects.flicker;
@@ -43,5 +37,8 @@ static void expose(const void *state, clt_exposure *exposure, const clt_band *ba
   }
 }
 
-const clt_effect clt_effect_flicker = {
-    .name = "flicker", .read = read, .called_for = called_for, .prepare = prepare, .expose = expose};
+const clt_effect clt_effect_flicker = {.name = "flicker",
+                                       .read = read,
+                                       .called_for = called_for,
+                                       .prepare = clt_effect_lend_description,
+                                       .expose = expose};

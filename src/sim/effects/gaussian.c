@@ -1,9 +1,11 @@
 #include "sim/effects/gaussian.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stddef.h>
 
-enum { FEW_VALUES = 1 << 15 };
+/* Products that one thread adds up sooner than several have met on a busy machine. */
+enum { FEW_PRODUCTS = 1 << 20 };
 
 void clt_gaussian_init(clt_gaussian *gaussian, double sigma) {
   double scale = 1.0 / (sigma * sqrt(2.0)), sum = 0.0;
@@ -37,12 +39,13 @@ static void blur_line(const clt_gaussian *gaussian, const float *from, float *to
 }
 
 void clt_gaussian_blur(const clt_gaussian *gaussian, int planes, int height, int width, float *values, float *scratch) {
+  bool threads_pay = (double)planes * height * width * gaussian->reach > FEW_PRODUCTS;
   size_t across = (size_t)width, plane = across * (size_t)height;
-#pragma omp parallel for schedule(static) if (planes * height * width > FEW_VALUES)
+#pragma omp parallel for schedule(static) if (threads_pay)
   for (int row = 0; row < planes * height; row++) {
     blur_line(gaussian, &values[(size_t)row * across], &scratch[(size_t)row * across], width, 1);
   }
-#pragma omp parallel for schedule(static) if (planes * height * width > FEW_VALUES)
+#pragma omp parallel for schedule(static) if (threads_pay)
   for (int column = 0; column < planes * width; column++) {
     size_t first = (size_t)(column / width) * plane + (size_t)(column % width);
     blur_line(gaussian, &scratch[first], &values[first], height, across);

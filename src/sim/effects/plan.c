@@ -15,6 +15,12 @@ void clt_effects_read(clt_section root, clt_scene_description *description) {
   }
 }
 
+clt_status clt_effect_lend_description(clt_scene *scene, clt_stage *stage, clt_error *error) {
+  (void)error;
+  stage->state = &scene->description;
+  return CLT_OK;
+}
+
 bool clt_effect_has_expose(const clt_effect *effect) {
   return effect->expose != NULL;
 }

@@ -9,14 +9,8 @@ static bool called_for(const clt_scene *scene, char *why) {
   return true;
 }
 
-static clt_status prepare(clt_scene *scene, clt_stage *stage, clt_error *error) {
-  (void)error;
-  stage->state = &scene->description.camera;
-  return CLT_OK;
-}
-
 static void samples(const void *state, clt_row *row) {
-  const clt_camera_description *sensor = state;
+  const clt_camera_description *sensor = &((const clt_scene_description *)state)->camera;
   double full = (1 << sensor->bits) - 1;
   for (int k = 0; k < row->count; k++) {
     double value = rint(sensor->black_level + row->values[k] * (full - sensor->black_level));
@@ -25,4 +19,4 @@ static void samples(const void *state, clt_row *row) {
 }
 
 const clt_effect clt_effect_quantisation = {
-    .name = "quantisation", .called_for = called_for, .prepare = prepare, .samples = samples};
+    .name = "quantisation", .called_for = called_for, .prepare = clt_effect_lend_description, .samples = samples};

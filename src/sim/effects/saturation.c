@@ -8,18 +8,12 @@ static bool called_for(const clt_scene *scene, char *why) {
   return true;
 }
 
-static clt_status prepare(clt_scene *scene, clt_stage *stage, clt_error *error) {
-  (void)error;
-  stage->state = &scene->description.camera;
-  return CLT_OK;
-}
-
 static void samples(const void *state, clt_row *row) {
-  double full_well = ((const clt_camera_description *)state)->full_well;
+  double full_well = ((const clt_scene_description *)state)->camera.full_well;
   for (int k = 0; k < row->count; k++) {
     row->values[k] = fmin(row->values[k] / full_well, 1.0);
   }
 }
 
 const clt_effect clt_effect_saturation = {
-    .name = "saturation", .called_for = called_for, .prepare = prepare, .samples = samples};
+    .name = "saturation", .called_for = called_for, .prepare = clt_effect_lend_description, .samples = samples};

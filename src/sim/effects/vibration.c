@@ -65,9 +65,15 @@ static int row_at(const clt_exposure *exposure, int y, int cells) {
 
 /* to += weight * from, `right` cells further right. */
 static void add_row(float *to, const float *from, int width, int right, float weight) {
-  for (int x = 0; x < width; x++) {
-    int at = x + right;
-    to[x] += weight * from[at < 0 ? 0 : at >= width ? width - 1 : at];
+  int first = right < 0 ? -right : 0, last = right > 0 ? width - right : width;
+  for (int x = 0; x < first && x < width; x++) {
+    to[x] += weight * from[0];
+  }
+  for (int x = first; x < last; x++) {
+    to[x] += weight * from[x + right];
+  }
+  for (int x = last > 0 ? last : 0; x < width; x++) {
+    to[x] += weight * from[width - 1];
   }
 }
 
