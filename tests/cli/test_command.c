@@ -73,10 +73,14 @@ static void refuses_with_the_word_at_fault(void **state) {
     outcome got;
     const char *names;
   } cases[] = {
-      {PARSE("T.h5", "--colour"), "--colour"},     {PARSE("T.h5", "-z"), "-z"},
-      {PARSE("T.h5", "--targe", "a"), "--targe"},  {PARSE("T.h5", "--target"), "--target"},
-      {PARSE("T.h5", "--dual=1"), "--dual"},       {PARSE("T.h5", "--json=1"), "--json"},
-      {PARSE("--dual"), "usage: counterlight try"}, {PARSE("a", "b", "c"), "'c'"},
+      {PARSE("T.h5", "--colour"), "--colour"},
+      {PARSE("T.h5", "-z"), "-z"},
+      {PARSE("T.h5", "--targe", "a"), "--targe"},
+      {PARSE("T.h5", "--target"), "--target"},
+      {PARSE("T.h5", "--dual=1"), "--dual"},
+      {PARSE("T.h5", "--json=1"), "--json"},
+      {PARSE("--dual"), "usage: counterlight try"},
+      {PARSE("a", "b", "c"), "'c'"},
       {PARSE("T.h5", "-qx"), "-q"},
   };
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
