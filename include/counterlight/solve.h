@@ -114,6 +114,10 @@ CLT_PUBLIC clt_status clt_target(const clt_transport *transport, const clt_certi
 CLT_PUBLIC clt_status clt_predict(const clt_transport *transport, const clt_image *drive, clt_image *seen,
                                   clt_error *error);
 
+/* The single brightness factor that brings seen nearest to target over lit cells, <seen, target> / <seen, seen>; 1
+ * where nothing is seen. */
+CLT_PUBLIC double clt_best_gain(const clt_certificate *certificate, const clt_image *seen, const clt_image *target);
+
 /* ||gain * seen - target|| / ||target|| over lit cells; with best_gain the gain that makes it least, else gain 1. For a
  * target that is black everywhere the distance is taken relative to white in place of the target. */
 CLT_PUBLIC double clt_appearance_error(const clt_certificate *certificate, const clt_image *seen,

@@ -53,21 +53,6 @@ static clt_status solve(demo *d, clt_error *error) {
                                  &d->drive, &d->result, error);
 }
 
-/* The gain that brings seen nearest to target over lit cells: <seen, target> / <seen, seen>. */
-static double best_gain(const clt_certificate *certificate, const clt_image *seen, const clt_image *target) {
-  size_t cells = (size_t)seen->width * (size_t)seen->height;
-  double across = 0, power = 0;
-  for (int c = 0; c < seen->channels; c++) {
-    const unsigned char *lit = clt_certificate_lit(certificate, c);
-    for (size_t i = 0; i < cells; i++) {
-      double value = lit[i] ? seen->data[(size_t)c * cells + i] : 0;
-      across += value * target->data[(size_t)c * cells + i];
-      power += value * value;
-    }
-  }
-  return power > 0 ? across / power : 1;
-}
-
 static clt_status draw_error_map(const demo *d, demo_sight *sight, clt_error *error) {
   clt_status status = clt_image_init(&sight->error_map, 1, d->grid.height, d->grid.width, error);
   if (status) {
@@ -118,7 +103,7 @@ static clt_status photograph(const demo *d, const clt_image *drive, bool fit_gai
     status = clt_scene_appearance(d->station.scene, drive, &exact, error);
   }
   if (!status) {
-    sight->gain = fit_gain ? best_gain(d->certificate, &sight->radiance, &d->target) : 1;
+    sight->gain = fit_gain ? clt_best_gain(d->certificate, &sight->radiance, &d->target) : 1;
     sight->error = clt_appearance_error(d->certificate, &sight->radiance, &d->target, fit_gain);
     sight->exact_error = clt_appearance_error(d->certificate, &exact, &d->target, fit_gain);
     status = draw_error_map(d, sight, error);

@@ -57,7 +57,9 @@ bool probe_transport(const char *path) {
   if (ended.fd >= 0 && poll(&ended, 1, (int)(seconds * 1000)) == 0) {
     kill(child, SIGKILL);
   }
-  close(ended.fd);
+  if (ended.fd >= 0) {
+    close(ended.fd);
+  }
   int outcome = 0;
   waitpid(child, &outcome, 0);
   return WIFEXITED(outcome) && (WEXITSTATUS(outcome) == WHOLE || WEXITSTATUS(outcome) == REFUSED);

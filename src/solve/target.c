@@ -121,12 +121,15 @@ static moments lit_moments(const clt_certificate *certificate, const clt_image *
   return sum;
 }
 
+double clt_best_gain(const clt_certificate *certificate, const clt_image *seen, const clt_image *target) {
+  moments sum = lit_moments(certificate, seen, target, 1);
+  return sum.seen_seen > 0 ? sum.seen_target / sum.seen_seen : 1;
+}
+
 double clt_appearance_error(const clt_certificate *certificate, const clt_image *seen, const clt_image *target,
                             bool best_gain) {
-  moments sum = lit_moments(certificate, seen, target, 1);
-  if (best_gain && sum.seen_seen > 0) {
-    sum = lit_moments(certificate, seen, target, sum.seen_target / sum.seen_seen);
-  }
+  double gain = best_gain ? clt_best_gain(certificate, seen, target) : 1;
+  moments sum = lit_moments(certificate, seen, target, gain);
   double size = sum.target_target > 0 ? sum.target_target : sum.white_white;
   return size > 0 ? sqrt(sum.distance / size) : 0;
 }

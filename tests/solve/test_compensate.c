@@ -259,6 +259,8 @@ static void errors_are_what_the_hand_computes(void **state) {
   /* (1 - 2)^2 + (2 - 1)^2 over 4 + 1; gain 4 / 5: (0.8 - 2)^2 + (1.6 - 1)^2 */
   assert_near(clt_appearance_error(room.certificate, &seen, &target, false), sqrt(2.0 / 5), 1e-12);
   assert_near(clt_appearance_error(room.certificate, &seen, &target, true), sqrt((1.44 + .36) / 5), 1e-12);
+  assert_near(clt_best_gain(room.certificate, &seen, &target), .8, 1e-12);
+  assert_near(clt_best_gain(room.certificate, &black, &target), 1, 0);
   assert_near(clt_appearance_error(room.certificate, &target, &target, false), 0, 1e-12);
   assert_near(clt_appearance_error(room.certificate, &black, &target, true), 1, 1e-12);
   /* a black target: relative to white, which is 1 on two cells */
