@@ -50,30 +50,52 @@ typedef struct clt_solve_options {
                           projection on 0 <= l <= F */
   int iteration_limit; /* > 0; 0 means 1000 */
   double deadline_s;   /* wall time after which the best drive so far is returned; <= 0 means none */
-  const double *start; /* warm start: channels * cols drive values, or NULL for zero */
+  const double *start; /* warm start of clt_solve: channels * cols drive values, or NULL for zero */
+  bool together;       /* the channels as one system: they iterate in step, and storage that they share is read once for
+                          all. The methods that need the entries of T solve channel by channel all the same */
+  bool discrepancy; /* stop where only noise is left (the discrepancy principle): at ||r|| <= 1.05 sqrt(M) sqrt(noise^2
+                       + sigma_T^2 ||x||^2), M lit rows, sigma_T from the transport's sigma, if `tolerance` asks for
+                       less */
+  double noise;     /* standard deviation of a wanted value (radiance), >= 0, for `discrepancy` */
 } clt_solve_options;
 
 typedef struct clt_solve_result {
-  char method[24];    /* the method that gave the answer */
-  char reason[200];   /* why this one, in one sentence */
-  int iterations;     /* the most that any channel took */
-  double residual;    /* ||T x - b|| / ||b|| over lit rows of every channel, of the x that is returned */
-  double seconds;     /* wall time */
-  bool converged;     /* false where the iteration limit or the deadline came first */
-  size_t curve_count; /* residual after iteration k, k = 0.. (channels together), for convergence plots */
+  char method[24];        /* the method that gave the answer */
+  char reason[200];       /* why this one, in one sentence */
+  int iterations;         /* the most that any channel took */
+  double residual;        /* ||T x - b|| / ||b|| over lit rows of every channel, of the x that is returned */
+  double seconds;         /* wall time of the solve */
+  double prepare_seconds; /* wall time that making the method ready took, once for every solve with the solver */
+  bool converged;         /* false where the iteration limit or the deadline came first */
+  size_t curve_count;     /* residual after iteration k, k = 0.. (channels together), for convergence plots */
   double curve[256];
 } clt_solve_result;
 
-/* The names of the methods, in order: index 0.. until NULL ("jacobi", "pcg", "gmres", "bounded"). */
+/* The names of the methods, in order: index 0.. until NULL. */
 CLT_PUBLIC const char *clt_method_name(size_t index);
 /* One sentence on what the method is and when it serves. */
 CLT_PUBLIC const char *clt_method_summary(size_t index);
 
-/* Solves for drive (channels * cols values) with wanted (channels * rows values: target less black).
- * "bounded" and "auto" keep 0 <= drive <= 1; the other methods solve the unbounded system and leave drive unclipped.
- * A method that the certificate shows to diverge is refused (CLT_BAD_INPUT with the reason); one that diverges in spite
- * of its certificate is detected and replaced, which method and reason tell. CLT_BAD_INPUT for a method that does not
- * exist (the message lists those that do), options out of range, or a target that is not finite. */
+/* A method made ready for one transport: its workspace, and what it keeps from solve to solve (a factor, a stored
+ * inverse). One solve at a time. */
+typedef struct clt_solver clt_solver;
+
+/* Makes the method of `options` (NULL: all defaults; `start` is not read) ready, or every method that "auto" may take.
+ * A method that the certificate shows to diverge, or that needs more memory than it may take, is refused
+ * (CLT_BAD_INPUT with the reason and what to take instead), and so are a method that does not exist (the message lists
+ * those that do) and options out of range. transport and certificate outlive the solver. */
+CLT_PUBLIC clt_status clt_solver_create(const clt_transport *transport, const clt_certificate *certificate,
+                                        const clt_solve_options *options, clt_solver **out, clt_error *error);
+CLT_PUBLIC void clt_solver_destroy(clt_solver *solver); /* accepts NULL */
+
+/* Solves for drive (channels * cols values) with wanted (channels * rows values: target less black), from `start`
+ * (channels * cols drive values; NULL: zero). "bounded" and "auto" keep 0 <= drive <= 1; the other methods solve the
+ * unbounded system and leave drive unclipped. A method that diverges in spite of its certificate is detected and
+ * replaced, which method and reason of the result tell. CLT_BAD_INPUT for a wanted or a start that is not finite. */
+CLT_PUBLIC clt_status clt_solver_run(clt_solver *solver, const double *wanted, const double *start, double *drive,
+                                     clt_solve_result *result, clt_error *error);
+
+/* One solve with a solver of its own, from options->start. */
 CLT_PUBLIC clt_status clt_solve(const clt_transport *transport, const clt_certificate *certificate,
                                 const double *wanted, const clt_solve_options *options, double *drive,
                                 clt_solve_result *result, clt_error *error);

@@ -93,6 +93,12 @@ CLT_PUBLIC float *clt_transport_entries(const clt_transport *transport, int chan
 
 /* y = T x: x has cols values, y has rows; they must not overlap. */
 CLT_PUBLIC void clt_transport_apply(const clt_transport *transport, int channel, const double *x, double *y);
+/* The same of every channel, channel after channel: x has channels * cols values, y has channels * rows. Storage that
+ * the channels share is read once. */
+CLT_PUBLIC void clt_transport_apply_all(const clt_transport *transport, const double *x, double *y);
+/* Row i of a channel: row_j = T_ij, cols values. At once of dense storage, by a transposed product of any other. */
+CLT_PUBLIC clt_status clt_transport_row(const clt_transport *transport, int channel, size_t i, double *row,
+                                        clt_error *error);
 /* x = T' y: y has rows values, x has cols. */
 CLT_PUBLIC void clt_transport_apply_transposed(const clt_transport *transport, int channel, const double *y, double *x);
 /* d_i = T_ii for i < min(rows, cols): the response of a cell to its own drive, F up to the light that returns to it. */

@@ -186,6 +186,7 @@ const clt_method clt_method_bounded = {
         "the best drive within 0..1: spectral projected gradients, then an active set; slower, and up to twice as "
         "accurate as clamping where the room cannot reach the target",
     .bounded = true,
+    .rectangular = true,
     .vectors = CLT_GMRES_VECTORS + 3,
     .run = run_bounded,
 };

@@ -239,7 +239,7 @@ clt_status clt_certify(const clt_transport *transport, clt_certificate **out, cl
     status = clt_fail(error, CLT_FAILED, "not enough memory for a certificate of %zu cells", info.cols);
   }
   if (status == CLT_OK) {
-    status = clt_system_init(&system, transport, error);
+    status = clt_system_init(&system, transport, false, error);
   }
   if (status == CLT_OK) {
     status = clt_system_reserve(&system, CLT_FLUX_VECTORS, error);

@@ -96,7 +96,7 @@ static clt_outcome run_gmres(clt_system *system, clt_run *run) {
                      .count = system->cols,
                      .basis = clt_system_vector(system, 0),
                      .stride = system->stride,
-                     .target = run->tolerance * system->wanted_norm};
+                     .target = clt_run_target(run, system)};
   double norm = clt_system_residual(system, system->light, r);
   clt_run_open(run, norm);
   int stale = 0;
@@ -107,6 +107,7 @@ static clt_outcome run_gmres(clt_system *system, clt_run *run) {
     double before = norm;
     clt_gmres_cycle(&gmres, run, r, norm, system->light);
     norm = clt_system_residual(system, system->light, r);
+    gmres.target = clt_run_target(run, system);
     stale = norm > STALE_FACTOR * before ? stale + 1 : 0;
   }
   return CLT_RUN_CONVERGED;

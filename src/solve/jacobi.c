@@ -23,7 +23,7 @@ static clt_outcome run_jacobi(clt_system *system, clt_run *run) {
   double start = norm, least = norm, growth = run->radius_high < 1 ? GROWTH_CERTIFIED : GROWTH;
   int growing = 0;
   clt_run_open(run, norm);
-  while (norm > run->tolerance * system->wanted_norm) {
+  while (norm > clt_run_target(run, system)) {
     if (!clt_run_may_go_on(run)) {
       return CLT_RUN_STOPPED;
     }

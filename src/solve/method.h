@@ -18,9 +18,16 @@ typedef enum clt_outcome {
 
 enum { CLT_CURVE_MAX = 256, CLT_NOTE_MAX = 128 };
 
-/* One channel's way through a method: its limits, and what is told of it. */
+/* What noise leaves of a residual (NUMERICS: the discrepancy principle); zeros where it is not asked for. */
+typedef struct clt_noise {
+  double observed;                  /* sum over lit rows of the variance of an observation */
+  double entries[CLT_CHANNELS_MAX]; /* of each channel in the system: sum over lit rows of the variance of an entry */
+} clt_noise;
+
+/* One system's way through a method: its limits, and what is told of it. */
 typedef struct clt_run {
   double tolerance;
+  clt_noise noise;
   int iteration_limit; /* counts down from the start of the channel, over every method that runs on it */
   int64_t start_ns;
   double deadline_s;           /* since start_ns; <= 0: none */
@@ -33,19 +40,33 @@ typedef struct clt_run {
 
 typedef struct clt_method {
   const char *name, *summary;
-  bool bounded; /* keeps 0 <= x <= 1, and takes systems with rows != cols */
+  bool bounded;     /* keeps 0 <= x <= 1 */
+  bool rectangular; /* takes systems with rows != cols */
+  bool apart;       /* works on single channels only */
   size_t vectors;
   /* NULL, or fails with CLT_BAD_INPUT where the certificate of a channel shows that the method cannot serve. */
   clt_status (*check)(const clt_channel_certificate *channel, clt_error *error);
-  /* Improves system->light until ||b - S l|| <= run->tolerance ||b||; needs `vectors` reserved, b != 0. */
+  /* NULL, or makes what the method keeps of the selected system for every solve (a factor, a table). The caller ends
+   * *prepared by `release` in either case. */
+  clt_status (*prepare)(clt_system *system, void **prepared, clt_error *error);
+  void (*release)(void *prepared); /* accepts NULL and half-built ones; NULL where there is no `prepare` */
+  /* Improves system->light until ||b - S l|| <= clt_run_target; needs `vectors` reserved, system->prepared, b != 0. */
   clt_outcome (*run)(clt_system *system, clt_run *run);
 } clt_method;
 
 extern const clt_method clt_method_jacobi, clt_method_pcg, clt_method_gmres, clt_method_bounded;
 
+/* Every method, ended by NULL (table.c). */
+extern const clt_method *const clt_methods[];
+/* The method of that name, or NULL. */
+const clt_method *clt_method_find(const char *name);
+
 /* The Krylov method that the reciprocity defect allows: pcg or gmres. */
 const clt_method *clt_method_linear(double reciprocity);
 
+/* The ||b - S l|| at which a run has done its work: tolerance ||b||, or, where it is asked for, what noise leaves of
+ * the residual of system->light, 1.05 sqrt(sum sigma_c^2 + sum sigma_T^2 ||x||^2), if that is more. */
+double clt_run_target(const clt_run *run, const clt_system *system);
 /* The residual before the first iteration opens the curve. */
 void clt_run_open(clt_run *run, double norm);
 /* Counts an iteration that ended with this residual. */

@@ -111,7 +111,7 @@ static bool recompute(cg *state, clt_run *run, double target) {
 
 static clt_outcome run_pcg(clt_system *system, clt_run *run) {
   cg state = {.system = system};
-  double target = run->tolerance * system->wanted_norm;
+  double target = clt_run_target(run, system);
   clt_outcome outcome = CLT_RUN_CONVERGED;
   begin(&state);
   clt_run_open(run, state.norm);
@@ -125,6 +125,7 @@ static clt_outcome run_pcg(clt_system *system, clt_run *run) {
       break;
     }
     clt_run_count(run, state.norm);
+    target = clt_run_target(run, system);
     bool due = state.norm <= target || state.since_true >= RECOMPUTE_EVERY;
     if (!makes_progress(&state, run) || (due && !recompute(&state, run, target))) {
       outcome = CLT_RUN_BROKE;

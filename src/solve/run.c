@@ -1,3 +1,4 @@
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 
@@ -8,6 +9,21 @@ static void append(clt_run *run, double norm) {
   if (run->curve_count < CLT_CURVE_MAX) {
     run->curve[run->curve_count++] = norm;
   }
+}
+
+double clt_run_target(const clt_run *run, const clt_system *system) {
+  static const double SAFETY = 1.05;
+  double target = run->tolerance * system->wanted_norm, left = run->noise.observed;
+  size_t cols = system->cols / (size_t)system->channels;
+  for (int c = 0; c < system->channels; c++) {
+    double squares = 0;
+    for (size_t j = (size_t)c * cols; j < (size_t)(c + 1) * cols && run->noise.entries[c] > 0; j++) {
+      double drive = system->light[j] * system->scale[j];
+      squares += drive * drive;
+    }
+    left += run->noise.entries[c] * squares;
+  }
+  return fmax(target, SAFETY * sqrt(left));
 }
 
 void clt_run_open(clt_run *run, double norm) {

@@ -4,16 +4,20 @@
 
 #include "base/memory.h"
 
-clt_status clt_system_init(clt_system *system, const clt_transport *transport, clt_error *error) {
+clt_status clt_system_init(clt_system *system, const clt_transport *transport, bool together, clt_error *error) {
   clt_transport_info info = clt_transport_describe(transport);
-  *system = (clt_system){.transport = transport, .rows = info.rows, .cols = info.cols};
-  system->square = info.rows == info.cols;
-  system->stride = info.rows > info.cols ? info.rows : info.cols;
-  system->scale = clt_alloc(info.cols, sizeof(double));
-  system->drive = clt_alloc(info.cols, sizeof(double));
-  system->light = clt_alloc(info.cols, sizeof(double));
-  system->seen = clt_alloc(info.rows, sizeof(double));
-  system->wanted = clt_alloc(info.rows, sizeof(double));
+  size_t channels = together ? (size_t)info.channels : 1;
+  *system = (clt_system){.transport = transport,
+                         .rows = channels * info.rows,
+                         .cols = channels * info.cols,
+                         .channels = (int)channels,
+                         .square = info.rows == info.cols};
+  system->stride = system->rows > system->cols ? system->rows : system->cols;
+  system->scale = clt_alloc(system->cols, sizeof(double));
+  system->drive = clt_alloc(system->cols, sizeof(double));
+  system->light = clt_alloc(system->cols, sizeof(double));
+  system->seen = clt_alloc(system->rows, sizeof(double));
+  system->wanted = clt_alloc(system->rows, sizeof(double));
   if (system->scale == NULL || system->drive == NULL || system->light == NULL || system->seen == NULL ||
       system->wanted == NULL) {
     clt_system_finish(system);
@@ -37,6 +41,7 @@ void clt_system_select(clt_system *system, int channel, const double *first_boun
   system->first_bounce = first_bounce;
   system->lit = lit;
   system->flux = NULL;
+  system->prepared = NULL;
   system->reciprocity = 0;
   system->wanted_norm = 0;
   for (size_t j = 0; j < system->cols; j++) {
@@ -84,11 +89,27 @@ static void drop_dark_rows(const clt_system *system, double *values) {
   }
 }
 
+static void apply_transport(const clt_system *system, const double *x, double *y) {
+  if (system->channels > 1) {
+    clt_transport_apply_all(system->transport, x, y);
+  } else {
+    clt_transport_apply(system->transport, system->channel, x, y);
+  }
+}
+
+static void apply_transport_transposed(const clt_system *system, const double *y, double *x) {
+  size_t channels = (size_t)system->channels;
+  for (size_t c = 0; c < channels; c++) {
+    clt_transport_apply_transposed(system->transport, system->channel + (int)c, y + c * (system->rows / channels),
+                                   x + c * (system->cols / channels));
+  }
+}
+
 void clt_system_apply(clt_system *system, const double *l, double *out) {
   for (size_t j = 0; j < system->cols; j++) {
     system->drive[j] = l[j] * system->scale[j];
   }
-  clt_transport_apply(system->transport, system->channel, system->drive, out);
+  apply_transport(system, system->drive, out);
   drop_dark_rows(system, out);
   system->products++;
 }
@@ -96,7 +117,7 @@ void clt_system_apply(clt_system *system, const double *l, double *out) {
 void clt_system_apply_transposed(clt_system *system, const double *r, double *out) {
   clt_copy(system->rows, r, system->seen);
   drop_dark_rows(system, system->seen);
-  clt_transport_apply_transposed(system->transport, system->channel, system->seen, out);
+  apply_transport_transposed(system, system->seen, out);
   for (size_t j = 0; j < system->cols; j++) {
     out[j] *= system->scale[j];
   }
@@ -109,4 +130,11 @@ double clt_system_residual(clt_system *system, const double *l, double *r) {
     r[i] = system->wanted[i] - r[i];
   }
   return clt_norm(system->rows, r);
+}
+
+void clt_system_drive_residual(clt_system *system, const double *drive, double *r) {
+  apply_transport(system, drive, r);
+  for (size_t i = 0; i < system->rows; i++) {
+    r[i] = clt_system_row_is_lit(system, i) ? system->wanted[i] - r[i] : 0;
+  }
 }

@@ -1,7 +1,8 @@
-/* The linear system S l = b of one colour channel over its lit cells.
+/* The linear system S l = b of one colour channel over its lit cells, or of all channels together.
  *
  * S = T F^-1 restricted to lit rows and lit columns; l = F x. Vectors keep their full length (rows or cols values) and
- * hold 0 at dark cells. Where rows = cols a row is lit with its cell; otherwise every row takes part. */
+ * hold 0 at dark cells. Where rows = cols a row is lit with its cell; otherwise every row takes part. Channels together
+ * are one system whose vectors hold channel after channel, and whose S has a block for each. */
 #ifndef CLT_SOLVE_SYSTEM_H
 #define CLT_SOLVE_SYSTEM_H
 
@@ -15,15 +16,17 @@
 
 typedef struct clt_system {
   const clt_transport *transport;
-  size_t rows, cols;
+  size_t rows, cols; /* of a vector: those of the transport times channels */
+  int channels;      /* in one system: 1, or all of the transport's */
   bool square;
 
-  /* the channel that is selected */
+  /* the channel that is selected, or the first of all */
   int channel;
   const double *first_bounce; /* F, cols values */
   const double *flux;         /* w, cols values; NULL while the certificate is being made */
   const unsigned char *lit;   /* cols values */
   double reciprocity;
+  void *prepared; /* what the method that runs keeps of this system between solves; NULL where it keeps nothing */
 
   double *scale;        /* 1 / F at lit cells, 0 at dark ones; cols values */
   double *drive, *seen; /* operands of the products with T; cols and rows values */
@@ -36,10 +39,10 @@ typedef struct clt_system {
   size_t stride, pool_vectors;
 } clt_system;
 
-/* Workspace for any channel of the transport, which must outlive the system. */
-clt_status clt_system_init(clt_system *system, const clt_transport *transport, clt_error *error);
+/* Workspace for any channel of the transport, or for all together; the transport must outlive the system. */
+clt_status clt_system_init(clt_system *system, const clt_transport *transport, bool together, clt_error *error);
 void clt_system_finish(clt_system *system); /* accepts a zeroed system */
-/* Turns to a channel; the arrays (cols values) must stay. light and wanted become 0. */
+/* Turns to a channel (0 where all are together); the arrays (cols values) must stay. light and wanted become 0. */
 void clt_system_select(clt_system *system, int channel, const double *first_bounce, const unsigned char *lit);
 /* Takes b from rows values, dropping dark rows. */
 void clt_system_want(clt_system *system, const double *wanted);
@@ -54,6 +57,8 @@ void clt_system_apply(clt_system *system, const double *l, double *out);
 void clt_system_apply_transposed(clt_system *system, const double *r, double *out);
 /* r = b - S l; returns ||r||. */
 double clt_system_residual(clt_system *system, const double *l, double *r);
+/* r = b - T x over lit rows, of any drive x. */
+void clt_system_drive_residual(clt_system *system, const double *drive, double *r);
 
 static inline double clt_dot(size_t count, const double *a, const double *b) {
   return cblas_ddot((blasint)count, a, 1, b, 1);

@@ -16,18 +16,18 @@ static double norm_of(const double *values, int count) {
 
 /* The channels' curves together; a channel that has stopped keeps its last residual. */
 static void combine_curves(const clt_job *job, double wanted_norm, clt_solve_result *result) {
-  for (int c = 0; c < job->info.channels; c++) {
+  for (int c = 0; c < job->solver->systems; c++) {
     if (job->run[c].curve_count > result->curve_count) {
       result->curve_count = job->run[c].curve_count;
     }
   }
   for (size_t k = 0; k < result->curve_count; k++) {
     double rests[CLT_CHANNELS_MAX];
-    for (int c = 0; c < job->info.channels; c++) {
+    for (int c = 0; c < job->solver->systems; c++) {
       size_t count = job->run[c].curve_count;
       rests[c] = job->run[c].curve[k < count ? k : count - 1];
     }
-    result->curve[k] = wanted_norm > 0 ? norm_of(rests, job->info.channels) / wanted_norm : 0;
+    result->curve[k] = wanted_norm > 0 ? norm_of(rests, job->solver->systems) / wanted_norm : 0;
   }
 }
 
@@ -43,14 +43,15 @@ static void add_text(char *text, size_t size, const char *format, ...) {
 static void tell_reason(const clt_job *job, clt_solve_result *result) {
   char *text = result->reason;
   size_t size = sizeof result->reason;
-  if (!job->automatic) {
-    add_text(text, size, "%s was asked for", job->method->name);
-  } else if (job->info.rows != job->info.cols) {
-    add_text(text, size, "%zu rows for %zu columns: bounded least squares", job->info.rows, job->info.cols);
+  if (!job->solver->automatic) {
+    add_text(text, size, "%s was asked for", job->solver->method->name);
+  } else if (job->solver->info.rows != job->solver->info.cols) {
+    add_text(text, size, "%zu rows for %zu columns: bounded least squares", job->solver->info.rows,
+             job->solver->info.cols);
   } else {
-    clt_channel_certificate worst = clt_certificate_worst(job->certificate);
+    clt_channel_certificate worst = clt_certificate_worst(job->solver->certificate);
     add_text(text, size, "reciprocity defect %.2g and rho(R) in [%.2g, %.2g]: %s", worst.reciprocity, worst.radius_low,
-             worst.radius_high, job->method->name);
+             worst.radius_high, job->solver->method->name);
   }
   if (job->broken != NULL) {
     add_text(text, size, "; %s stopped as %s, so %s", job->broken->name, job->why, job->replacement->name);
@@ -66,11 +67,12 @@ static void tell_reason(const clt_job *job, clt_solve_result *result) {
 }
 
 void clt_job_tell(const clt_job *job, bool converged, clt_solve_result *result) {
-  double wanted_norm = norm_of(job->wanted_norm, job->info.channels);
-  *result = (clt_solve_result){.converged = converged, .seconds = clt_clock_since(job->start_ns)};
-  double residual = norm_of(job->residual, job->info.channels);
+  double wanted_norm = norm_of(job->wanted_norm, job->solver->systems);
+  *result = (clt_solve_result){
+      .converged = converged, .seconds = clt_clock_since(job->start_ns), .prepare_seconds = job->solver->prepare_s};
+  double residual = norm_of(job->residual, job->solver->systems);
   result->residual = wanted_norm > 0 ? residual / wanted_norm : 0;
-  for (int c = 0; c < job->info.channels; c++) {
+  for (int c = 0; c < job->solver->systems; c++) {
     if (job->run[c].iterations > result->iterations) {
       result->iterations = job->run[c].iterations;
     }

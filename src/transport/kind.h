@@ -10,6 +10,8 @@
 typedef struct clt_kind {
   const char *name; /* of the storage, and of its dataset or group in the file's root */
   void (*apply)(const clt_transport *transport, int channel, const double *x, double *y);
+  /* NULL where the channels share nothing: then `apply` runs for each. */
+  void (*apply_all)(const clt_transport *transport, const double *x, double *y);
   void (*apply_transposed)(const clt_transport *transport, int channel, const double *y, double *x);
   void (*diagonal)(const clt_transport *transport, int channel, double *diagonal);
   void (*row_sums)(const clt_transport *transport, int channel, double *sums);

@@ -121,6 +121,34 @@ void clt_transport_apply(const clt_transport *transport, int channel, const doub
   transport->kind->apply(transport, channel, x, y);
 }
 
+void clt_transport_apply_all(const clt_transport *transport, const double *x, double *y) {
+  if (transport->kind->apply_all != NULL) {
+    transport->kind->apply_all(transport, x, y);
+    return;
+  }
+  for (int c = 0; c < transport->channels; c++) {
+    transport->kind->apply(transport, c, x + (size_t)c * transport->cols, y + (size_t)c * transport->rows);
+  }
+}
+
+clt_status clt_transport_row(const clt_transport *transport, int channel, size_t i, double *row, clt_error *error) {
+  const float *entries = clt_transport_entries(transport, channel);
+  if (entries != NULL) {
+    for (size_t j = 0; j < transport->cols; j++) {
+      row[j] = (double)entries[i * transport->cols + j];
+    }
+    return CLT_OK;
+  }
+  double *unit = clt_alloc(transport->rows, sizeof *unit);
+  if (unit == NULL) {
+    return clt_fail(error, CLT_FAILED, "not enough memory for a row of %zu cells", transport->cols);
+  }
+  unit[i] = 1;
+  transport->kind->apply_transposed(transport, channel, unit, row);
+  free(unit);
+  return CLT_OK;
+}
+
 void clt_transport_apply_transposed(const clt_transport *transport, int channel, const double *y, double *x) {
   transport->kind->apply_transposed(transport, channel, y, x);
 }

@@ -1,0 +1,17 @@
+/* Which method serves a transport, and which one takes over where it breaks. */
+#ifndef CLT_SOLVE_CHOOSE_H
+#define CLT_SOLVE_CHOOSE_H
+
+#include "solve/method.h"
+
+/* The method that `auto` runs first. */
+const clt_method *clt_choose_first(const clt_certificate *certificate, const clt_transport_info *info);
+/* What takes over from a method that broke; gmres is the last resort and never breaks. */
+const clt_method *clt_choose_next(const clt_method *broken, double reciprocity);
+/* The method of that name, or CLT_BAD_INPUT with the names that there are. */
+clt_status clt_choose_named(const char *name, const clt_method **out, clt_error *error);
+/* CLT_BAD_INPUT with the reason where the certificate shows that the method cannot serve. */
+clt_status clt_choose_check(const clt_method *method, const clt_certificate *certificate,
+                            const clt_transport_info *info, clt_error *error);
+
+#endif
