@@ -84,8 +84,8 @@ typedef struct clt_scene_description {
   double ambient[CLT_SIM_CHANNELS_MAX]; /* radiance added to every cell */
   uint64_t seed;
   clt_effects_description effects;
-  clt_rectangle surfaces[CLT_SURFACES_MAX];
-  int surface_count;
+  clt_rectangle *surfaces; /* owned here, with room for surface_room of them */
+  int surface_count, surface_room;
   clt_transport *transport; /* of a transport_file, owned here; NULL where there are surfaces */
 } clt_scene_description;
 
@@ -93,6 +93,10 @@ typedef struct clt_scene_description {
  * and is finished by it in either case. */
 clt_status clt_scene_read(const char *path, clt_scene_description *description, clt_error *error);
 void clt_scene_description_finish(clt_scene_description *description);
+
+/* Makes room for `more` surfaces behind those that are there; false where a scene would have more than
+ * CLT_SURFACES_MAX, or memory is short. */
+bool clt_scene_reserve_surfaces(clt_scene_description *description, int more);
 
 /* Ambient radiance of the brightest channel. */
 double clt_ambient_most(const clt_scene_description *description);

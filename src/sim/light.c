@@ -8,31 +8,26 @@
 #include "sim/exchange.h"
 
 clt_status clt_light_init(clt_light *light, const clt_scene_description *description, clt_error *error) {
-  light->description = description;
+  const clt_mesh_size size = {.wanted = CLT_ELEMENTS_WANTED, .most = CLT_ELEMENTS_MAX};
   light->solved = -1;
-  clt_status status =
-      clt_visibility_create(description->surfaces, description->surface_count, &light->visibility, error);
-  if (status == CLT_OK) {
-    status = clt_mesh_init(&light->mesh, description, light->visibility, error);
-  }
-  if (status != CLT_OK) {
+  clt_status status = clt_layout_init(&light->layout, description, size, error);
+  const clt_mesh *mesh = &light->layout.mesh;
+  if (status != CLT_OK || mesh->count == 0) {
     return status;
   }
-  const clt_mesh *mesh = &light->mesh;
-  size_t count = (size_t)mesh->count, lit = (size_t)mesh->lit;
+  size_t count = (size_t)mesh->count, used = (size_t)mesh->used;
   light->exchange = clt_alloc(count * count, sizeof *light->exchange);
-  light->bounced = clt_alloc(lit * lit, sizeof *light->bounced);
+  light->bounced = clt_alloc(used * used, sizeof *light->bounced);
   if (!light->exchange || !light->bounced) {
     return clt_fail(error, CLT_FAILED, "%s: out of memory for %zu surface elements", description->path, count);
   }
   clt_parts parts = {description->surfaces,      mesh->elements, mesh->surface,
-                     description->surface_count, mesh->count,    light->visibility};
+                     description->surface_count, mesh->count,    light->layout.visibility};
   return clt_exchange_compute(&parts, light->exchange, error);
 }
 
 void clt_light_finish(clt_light *light) {
-  clt_mesh_finish(&light->mesh);
-  clt_visibility_destroy(light->visibility);
+  clt_layout_finish(&light->layout);
   free(light->exchange);
   free(light->bounced);
   *light = (clt_light){.solved = -1};
@@ -56,7 +51,7 @@ static double scaling(const clt_mesh *mesh, int channel, size_t element) {
 /* I - K into the lower triangle: entry (i, j), i > j, from H's (j, i), tile by tile. */
 static void fill_system(clt_light *light, int channel) {
   enum { TILE = 64 };
-  const clt_mesh *mesh = &light->mesh;
+  const clt_mesh *mesh = &light->layout.mesh;
   size_t count = (size_t)mesh->count;
 #pragma omp parallel for schedule(dynamic)
   for (size_t tile = 0; tile < count; tile += TILE) {
@@ -75,34 +70,38 @@ static void fill_system(clt_light *light, int channel) {
 
 /* D ((I - K)^-1 - I) D from the inverse in the lower triangle of the trailing block, both triangles. */
 static void keep_bounced(clt_light *light, int channel) {
-  const clt_mesh *mesh = &light->mesh;
-  size_t count = (size_t)mesh->count, lit = (size_t)mesh->lit, first = count - lit;
+  const clt_mesh *mesh = &light->layout.mesh;
+  size_t count = (size_t)mesh->count, used = (size_t)mesh->used, first = count - used;
 #pragma omp parallel for schedule(dynamic, 16)
-  for (size_t j = 0; j < lit; j++) {
+  for (size_t j = 0; j < used; j++) {
     const double *column = &light->exchange[(first + j) * count + first];
     double scale = scaling(mesh, channel, first + j);
-    for (size_t i = j; i < lit; i++) {
+    for (size_t i = j; i < used; i++) {
       double value = (column[i] - (i == j)) * scale * scaling(mesh, channel, first + i);
-      light->bounced[j * lit + i] = light->bounced[i * lit + j] = value;
+      light->bounced[j * used + i] = light->bounced[i * used + j] = value;
     }
   }
 }
 
 clt_status clt_light_solve(clt_light *light, int channel, clt_error *error) {
-  if (light->solved >= 0 && same_albedo(light->description, light->solved, channel)) {
+  if (light->solved >= 0 && same_albedo(light->layout.description, light->solved, channel)) {
     return CLT_OK;
   }
-  const clt_mesh *mesh = &light->mesh;
-  size_t first = (size_t)(mesh->count - mesh->lit);
+  const clt_mesh *mesh = &light->layout.mesh;
+  if (mesh->count == 0) {
+    light->solved = channel;
+    return CLT_OK;
+  }
+  size_t first = (size_t)(mesh->count - mesh->used);
   fill_system(light, channel);
   int failed = LAPACKE_dpotrf(LAPACK_COL_MAJOR, 'L', mesh->count, light->exchange, mesh->count);
   double *trailing = &light->exchange[first * (size_t)mesh->count + first];
   if (failed == 0) {
-    failed = LAPACKE_dpotri(LAPACK_COL_MAJOR, 'L', mesh->lit, trailing, mesh->count);
+    failed = LAPACKE_dpotri(LAPACK_COL_MAJOR, 'L', mesh->used, trailing, mesh->count);
   }
   if (failed != 0) {
     return clt_fail(error, CLT_FAILED, "%s: the light of channel %d could not be solved (LAPACK says %d)",
-                    light->description->path, channel, failed);
+                    light->layout.description->path, channel, failed);
   }
   keep_bounced(light, channel);
   light->solved = channel;
@@ -110,47 +109,53 @@ clt_status clt_light_solve(clt_light *light, int channel, clt_error *error) {
 }
 
 double clt_light_direct(const clt_light *light, int channel, int i) {
-  const clt_scene_description *description = light->description;
-  const clt_ray_end *ends = &light->mesh.ends[(size_t)i * (size_t)light->mesh.rays];
-  double sum = 0.0;
-  for (int ray = 0; ray < light->mesh.rays; ray++) {
-    if (ends[ray].surface >= 0) {
-      sum += ends[ray].share * ends[ray].falloff * description->surfaces[ends[ray].surface].albedo[channel];
-    }
-  }
-  return sum * description->projector.intensity[channel] / M_PI;
+  const clt_cells *cells = &light->layout.cells;
+  return cells->direct[(size_t)channel * (size_t)cells->count + (size_t)i];
 }
 
-/* With W the weights, radiosity B = bounced W_j' intensity omega_j, and row i sees W_i B / pi. */
-void clt_light_row(const clt_light *light, int channel, int i, double *row, double *scratch) {
-  const clt_mesh *mesh = &light->mesh;
-  size_t lit = (size_t)mesh->lit;
-  int first = mesh->count - mesh->lit;
-  memset(scratch, 0, lit * sizeof *scratch);
-  for (int k = mesh->start[i]; k < mesh->start[i + 1]; k++) {
-    const double *from = &light->bounced[(size_t)(mesh->element[k] - first) * lit];
-    for (size_t e = 0; e < lit; e++) {
-      scratch[e] += mesh->weight[k] * from[e];
+/* scratch = bounced V_i' */
+static void view_of(const clt_light *light, int i, double *scratch) {
+  const clt_mesh *mesh = &light->layout.mesh;
+  const clt_weights *sees = &mesh->sees;
+  size_t used = (size_t)mesh->used;
+  int first = mesh->count - mesh->used;
+  memset(scratch, 0, used * sizeof *scratch);
+  for (int k = sees->start[i]; k < sees->start[i + 1]; k++) {
+    const double *from = &light->bounced[(size_t)(sees->element[k] - first) * used];
+    for (size_t e = 0; e < used; e++) {
+      scratch[e] += sees->weight[k] * from[e];
     }
   }
-  double intensity = light->description->projector.intensity[channel];
-  for (int j = 0; j < mesh->cells; j++) {
-    double sum = 0.0;
-    for (int k = mesh->start[j]; k < mesh->start[j + 1]; k++) {
-      sum += mesh->weight[k] * scratch[mesh->element[k] - first];
+}
+
+/* T_ij = F_i [i = j] + V_i bounced W_j' solid_angle_j intensity / pi */
+void clt_light_row(const clt_light *light, int channel, int i, double *row, double *scratch) {
+  const clt_mesh *mesh = &light->layout.mesh;
+  const clt_cells *cells = &light->layout.cells;
+  const clt_weights *lights = &mesh->lights;
+  int first = mesh->count - mesh->used;
+  double intensity = light->layout.description->projector.intensity[channel];
+  memset(row, 0, (size_t)cells->count * sizeof *row);
+  if (mesh->count > 0) {
+    view_of(light, i, scratch);
+    for (int j = 0; j < cells->count; j++) {
+      double sum = 0.0;
+      for (int k = lights->start[j]; k < lights->start[j + 1]; k++) {
+        sum += lights->weight[k] * scratch[lights->element[k] - first];
+      }
+      row[j] = sum * cells->solid_angle[j] * intensity / M_PI;
     }
-    row[j] = sum * mesh->solid_angle[j] * intensity / M_PI;
   }
   row[i] += clt_light_direct(light, channel, i);
 }
 
 static clt_status fill_channel(clt_light *light, int channel, float *entries, clt_error *error) {
-  size_t cells = (size_t)light->mesh.cells, lit = (size_t)light->mesh.lit;
-  double above_black = 1.0 - light->description->projector.black;
+  size_t cells = (size_t)light->layout.cells.count, used = (size_t)light->layout.mesh.used;
+  double above_black = 1.0 - light->layout.description->projector.black;
   bool short_of_memory = false;
 #pragma omp parallel reduction(|| : short_of_memory)
   {
-    double *row = clt_alloc(cells + lit, sizeof *row);
+    double *row = clt_alloc(cells + used, sizeof *row);
     short_of_memory = row == NULL;
 #pragma omp for schedule(static)
     for (size_t i = 0; i < cells; i++) {
@@ -163,23 +168,58 @@ static clt_status fill_channel(clt_light *light, int channel, float *entries, cl
     }
     free(row);
   }
-  return short_of_memory ? clt_fail(error, CLT_FAILED, "%s: out of memory", light->description->path) : CLT_OK;
+  return short_of_memory ? clt_fail(error, CLT_FAILED, "%s: out of memory", light->layout.description->path) : CLT_OK;
 }
 
-clt_status clt_light_transport(const clt_scene_description *description, clt_transport **out, clt_error *error) {
+static clt_status make_dense(clt_light *light, clt_transport **out, clt_error *error) {
+  const clt_scene_description *description = light->layout.description;
+  clt_status status = clt_transport_create_dense(description->width, description->height, description->channels,
+                                                 (size_t)light->layout.cells.count, out, error);
+  for (int c = 0; c < description->channels && status == CLT_OK; c++) {
+    status = clt_light_solve(light, c, error);
+    if (status == CLT_OK) {
+      status = fill_channel(light, c, clt_transport_entries(*out, c), error);
+    }
+  }
+  return status;
+}
+
+/* Row i is F_i at cell i, which is node number i of the pyramid. */
+static clt_status make_diagonal(const clt_layout *layout, clt_transport **out, clt_error *error) {
+  const clt_scene_description *description = layout->description;
+  size_t cells = (size_t)layout->cells.count, values = cells * (size_t)description->channels;
+  int64_t *start = clt_alloc(cells + 1, sizeof *start);
+  int32_t *node = clt_alloc(cells, sizeof *node);
+  float *value = clt_alloc(values, sizeof *value);
+  clt_status status = CLT_FAILED;
+  if (start && node && value) {
+    for (size_t i = 0; i < cells; i++) {
+      start[i + 1] = (int64_t)i + 1;
+      node[i] = (int32_t)i;
+    }
+    for (size_t k = 0; k < values; k++) {
+      value[k] = (float)((1.0 - description->projector.black) * layout->cells.direct[k]);
+    }
+    status = clt_transport_create_tree(description->width, description->height, description->channels, cells, start,
+                                       node, value, out, error);
+  } else {
+    status = clt_fail(error, CLT_FAILED, "%s: out of memory", description->path);
+  }
+  free(start);
+  free(node);
+  free(value);
+  return status;
+}
+
+clt_status clt_light_transport(const clt_scene_description *description, clt_transport **out, clt_light_facts *facts,
+                               clt_error *error) {
   clt_light light = {.solved = -1};
   clt_transport *transport = NULL;
-  size_t cells = (size_t)description->width * (size_t)description->height;
   clt_status status = clt_light_init(&light, description, error);
   if (status == CLT_OK) {
-    status = clt_transport_create_dense(description->width, description->height, description->channels, cells,
-                                        &transport, error);
-  }
-  for (int c = 0; c < description->channels && status == CLT_OK; c++) {
-    status = clt_light_solve(&light, c, error);
-    if (status == CLT_OK) {
-      status = fill_channel(&light, c, clt_transport_entries(transport, c), error);
-    }
+    *facts = (clt_light_facts){.facing = light.layout.sights.facing, .exchanging = light.layout.sights.exchanging};
+    status = light.layout.mesh.count > 0 ? make_dense(&light, &transport, error)
+                                         : make_diagonal(&light.layout, &transport, error);
   }
   clt_light_finish(&light);
   if (status != CLT_OK) {

@@ -12,83 +12,38 @@ typedef struct division {
   bool triangle;
 } division;
 
-static void trace(clt_mesh *mesh, const clt_scene_description *description, const clt_visibility *visibility) {
-  clt_vector from = description->projector.pinhole.position;
-#pragma omp parallel for schedule(static)
-  for (int cell = 0; cell < mesh->cells; cell++) {
-    clt_ray_end *ends = &mesh->ends[(size_t)cell * mesh->rays];
-    double total = 0.0;
-    for (int ray = 0; ray < mesh->rays; ray++) {
-      clt_vector direction = clt_scene_ray(description, cell, ray, &ends[ray].share);
-      clt_hit hit = clt_visibility_first_hit(visibility, from, direction, -1);
-      total += ends[ray].share;
-      ends[ray].surface = hit.front ? hit.surface : -1;
-      if (ends[ray].surface >= 0) {
-        double length = vec_length(direction), distance = hit.distance * length;
-        double cosine = -vec_dot(direction, description->surfaces[hit.surface].normal) / length;
-        ends[ray].falloff = cosine / (distance * distance);
-        ends[ray].s = hit.s;
-        ends[ray].t = hit.t;
-      }
-    }
-    for (int ray = 0; ray < mesh->rays; ray++) {
-      ends[ray].share /= total;
-    }
-    mesh->solid_angle[cell] = total;
-  }
-}
-
-static int compare(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
-/* Median over lit cells of the area that a cell's solid angle covers: omega r^2 / cos. scratch: cells values. */
-static double median_footprint(const clt_mesh *mesh, double *scratch) {
-  int lit = 0;
-  for (int cell = 0; cell < mesh->cells; cell++) {
-    double area = 0.0, share = 0.0;
-    for (int ray = 0; ray < mesh->rays; ray++) {
-      const clt_ray_end *end = &mesh->ends[(size_t)cell * mesh->rays + ray];
-      if (end->surface >= 0) {
-        area += end->share * mesh->solid_angle[cell] / end->falloff;
-        share += end->share;
-      }
-    }
-    if (share > 0.0) {
-      scratch[lit++] = area / share;
-    }
-  }
-  qsort(scratch, (size_t)lit, sizeof *scratch, compare);
-  return scratch[lit / 2];
-}
-
-static int divide(const clt_scene_description *description, double side, division *divisions) {
-  int count = 0;
+/* Elements that squares of a side give; most + 1 where that is more than `most`. */
+static int divide(const clt_scene_description *description, const clt_sights *sights, double side, int most,
+                  division *divisions) {
+  double count = 0.0;
   for (int k = 0; k < description->surface_count; k++) {
     const clt_rectangle *surface = &description->surfaces[k];
-    double columns = fmin(fmax(1.0, ceil(vec_length(surface->u) / side - 1e-9)), CLT_ELEMENTS_MAX);
-    double rows = fmin(fmax(1.0, ceil(vec_length(surface->v) / side - 1e-9)), CLT_ELEMENTS_MAX);
+    double columns = fmin(fmax(1.0, ceil(vec_length(surface->u) / side - 1e-9)), most);
+    double rows = fmin(fmax(1.0, ceil(vec_length(surface->v) / side - 1e-9)), most);
     if (surface->triangle) {
       columns = rows = fmax(columns, rows);
     }
-    divisions[k] = (division){(int)columns, (int)rows, count, surface->triangle};
-    count = columns * rows + count > CLT_ELEMENTS_MAX ? CLT_ELEMENTS_MAX + 1 : count + (int)(columns * rows);
+    if (!sights->exchange[k]) {
+      columns = rows = 0.0;
+    }
+    divisions[k] = (division){(int)columns, (int)rows, (int)count, surface->triangle};
+    count = fmin(count + columns * rows, most + 1.0);
   }
-  return count;
+  return (int)count;
 }
 
 /* Divides the surfaces; returns the number of elements. */
-static int choose_division(const clt_scene_description *description, double footprint, division *divisions) {
+static int choose_division(const clt_scene_description *description, const clt_sights *sights, double footprint,
+                           clt_mesh_size size, division *divisions) {
   double area = 0.0;
   for (int k = 0; k < description->surface_count; k++) {
-    area += clt_rectangle_area(&description->surfaces[k]);
+    area += sights->exchange[k] ? clt_rectangle_area(&description->surfaces[k]) : 0.0;
   }
-  double side = sqrt(fmin(footprint, area / CLT_ELEMENTS_WANTED));
-  int count = divide(description, side, divisions);
-  while (count > CLT_ELEMENTS_MAX) {
+  double side = sqrt(fmin(footprint, area / size.wanted));
+  int count = divide(description, sights, side, size.most, divisions);
+  while (count > size.most) {
     side *= 1.02;
-    count = divide(description, side, divisions);
+    count = divide(description, sights, side, size.most, divisions);
   }
   return count;
 }
@@ -131,26 +86,30 @@ static clt_rectangle part_of(const clt_rectangle *whole, const division *by, int
   return part;
 }
 
-/* Numbers the elements: place[old] = new, lit ones last. */
-static void order_elements(clt_mesh *mesh, const division *divisions, int *place) {
-  memset(place, 0, (size_t)mesh->count * sizeof *place);
-  for (size_t k = 0; k < (size_t)mesh->cells * (size_t)mesh->rays; k++) {
-    clt_ray_end *end = &mesh->ends[k];
-    end->element = end->surface >= 0 ? element_at(&divisions[end->surface], end->s, end->t) : -1;
-    if (end->element >= 0) {
-      mesh->lit += place[end->element] == 0;
-      place[end->element] = 1;
-    }
+/* place[old] = 1 for the elements of a list. */
+static void mark(const clt_weights *list, int *place) {
+  for (int k = 0; k < list->start[list->rows]; k++) {
+    place[list->element[k]] = 1;
   }
-  int unlit = 0, lit = mesh->count - mesh->lit;
+}
+
+static void renumber(clt_weights *list, const int *place) {
+  for (int k = 0; k < list->start[list->rows]; k++) {
+    list->element[k] = place[list->element[k]];
+  }
+}
+
+/* Numbers the elements: place[old] = new, used ones last. place comes as zeros. */
+static void order_elements(clt_mesh *mesh, int *place) {
+  mark(&mesh->lights, place);
   for (int k = 0; k < mesh->count; k++) {
-    place[k] = place[k] != 0 ? lit++ : unlit++;
+    mesh->used += place[k];
   }
-  for (size_t k = 0; k < (size_t)mesh->cells * (size_t)mesh->rays; k++) {
-    if (mesh->ends[k].element >= 0) {
-      mesh->ends[k].element = place[mesh->ends[k].element];
-    }
+  int unused = 0, used = mesh->count - mesh->used;
+  for (int k = 0; k < mesh->count; k++) {
+    place[k] = place[k] != 0 ? used++ : unused++;
   }
+  renumber(&mesh->lights, place);
 }
 
 static void place_elements(clt_mesh *mesh, const clt_scene_description *description, const division *divisions,
@@ -165,71 +124,106 @@ static void place_elements(clt_mesh *mesh, const clt_scene_description *descript
   }
 }
 
-/* Sums the sub-rays of each cell by element. */
-static void gather_weights(clt_mesh *mesh) {
+/* The lists of some cells on their way into the mesh. */
+enum { BLOCK = 64 };
+typedef struct block {
+  int count[BLOCK]; /* entries of each cell */
+  int *element;     /* CLT_CELL_RAYS_MAX of each cell */
+  double *weight;
+} block;
+
+/* Sums the sub-rays of a cell by element; returns how many elements there are. */
+static int gather(const clt_ray_end *ends, int rays, const division *divisions, int *element, double *weight) {
   int used = 0;
-  for (int cell = 0; cell < mesh->cells; cell++) {
-    int first = mesh->start[cell] = used;
-    for (int ray = 0; ray < mesh->rays; ray++) {
-      const clt_ray_end *end = &mesh->ends[(size_t)cell * mesh->rays + ray];
-      if (end->surface < 0) {
-        continue;
-      }
-      int k = first;
-      while (k < used && mesh->element[k] != end->element) {
-        k++;
-      }
-      if (k == used) {
-        mesh->element[used++] = end->element;
-        mesh->weight[k] = 0.0;
-      }
-      mesh->weight[k] += end->share;
+  for (int ray = 0; ray < rays; ray++) {
+    const clt_ray_end *end = &ends[ray];
+    if (end->surface < 0 || divisions[end->surface].columns == 0) {
+      continue;
     }
+    int at = element_at(&divisions[end->surface], end->s, end->t), k = 0;
+    while (k < used && element[k] != at) {
+      k++;
+    }
+    if (k == used) {
+      element[used++] = at;
+      weight[k] = 0.0;
+    }
+    weight[k] += end->share;
   }
-  mesh->start[mesh->cells] = used;
+  return used;
 }
 
-static clt_status out_of_memory(const clt_scene_description *description, clt_error *error) {
-  return clt_fail(error, CLT_FAILED, "%s: out of memory for the light's mesh; use a smaller grid", description->path);
+static bool append_block(clt_mesh *mesh, const block *from, int cells) {
+  bool enough = true;
+  for (int k = 0; k < cells && enough; k++) {
+    size_t first = (size_t)k * CLT_CELL_RAYS_MAX;
+    enough = clt_weights_append(&mesh->lights, &from->element[first], &from->weight[first], from->count[k]);
+  }
+  return enough;
+}
+
+/* Traces the cells block by block, so that only a few ends are held at a time, and keeps the lists in the cells' order.
+ */
+static bool list_elements(clt_mesh *mesh, const clt_scene_description *description, const clt_visibility *visibility,
+                          const division *divisions) {
+  bool enough = true;
+#pragma omp parallel reduction(&& : enough)
+  {
+    block own = {.element = clt_alloc((size_t)BLOCK * CLT_CELL_RAYS_MAX, sizeof *own.element),
+                 .weight = clt_alloc((size_t)BLOCK * CLT_CELL_RAYS_MAX, sizeof *own.weight)};
+    clt_ray_end ends[CLT_CELL_RAYS_MAX];
+    enough = own.element != NULL && own.weight != NULL;
+#pragma omp for ordered schedule(static, 1)
+    for (int first = 0; first < mesh->cells; first += BLOCK) {
+      int cells = mesh->cells - first < BLOCK ? mesh->cells - first : BLOCK;
+      for (int k = 0; k < cells && enough; k++) {
+        size_t at = (size_t)k * CLT_CELL_RAYS_MAX;
+        clt_cell_trace(description, visibility, first + k, ends);
+        own.count[k] =
+            gather(ends, description->rays * description->rays, divisions, &own.element[at], &own.weight[at]);
+      }
+#pragma omp ordered
+      enough = enough && append_block(mesh, &own, cells);
+    }
+    free(own.element);
+    free(own.weight);
+  }
+  return enough;
+}
+
+static bool make_elements(clt_mesh *mesh, const clt_scene_description *description, const division *divisions) {
+  int *place = clt_alloc((size_t)mesh->count, sizeof *place);
+  mesh->elements = clt_alloc((size_t)mesh->count, sizeof *mesh->elements);
+  mesh->surface = clt_alloc((size_t)mesh->count, sizeof *mesh->surface);
+  bool enough = place != NULL && mesh->elements != NULL && mesh->surface != NULL;
+  if (enough) {
+    order_elements(mesh, place);
+    place_elements(mesh, description, divisions, place);
+  }
+  free(place);
+  return enough;
 }
 
 clt_status clt_mesh_init(clt_mesh *mesh, const clt_scene_description *description, const clt_visibility *visibility,
-                         clt_error *error) {
-  mesh->cells = description->width * description->height;
-  mesh->rays = description->rays * description->rays;
-  size_t cells = (size_t)mesh->cells, ends = cells * (size_t)mesh->rays;
-  mesh->ends = clt_alloc(ends, sizeof *mesh->ends);
-  mesh->solid_angle = clt_alloc(cells, sizeof *mesh->solid_angle);
-  mesh->start = clt_alloc(cells + 1, sizeof *mesh->start);
-  mesh->element = clt_alloc(ends, sizeof *mesh->element);
-  mesh->weight = clt_alloc(ends, sizeof *mesh->weight);
-  if (!mesh->ends || !mesh->solid_angle || !mesh->start || !mesh->element || !mesh->weight) {
-    return out_of_memory(description, error);
+                         const clt_cells *cells, const clt_sights *sights, clt_mesh_size size, clt_error *error) {
+  division *divisions = clt_alloc((size_t)description->surface_count, sizeof *divisions);
+  mesh->cells = cells->count;
+  bool enough = divisions != NULL;
+  if (enough) {
+    mesh->count = choose_division(description, sights, cells->footprint, size, divisions);
+    enough = clt_weights_init(&mesh->lights, mesh->cells) && list_elements(mesh, description, visibility, divisions) &&
+             make_elements(mesh, description, divisions);
+    mesh->sees = mesh->lights;
   }
-  trace(mesh, description, visibility);
-  division divisions[CLT_SURFACES_MAX];
-  mesh->count = choose_division(description, median_footprint(mesh, mesh->weight), divisions);
-  mesh->elements = clt_alloc((size_t)mesh->count, sizeof *mesh->elements);
-  mesh->surface = clt_alloc((size_t)mesh->count, sizeof *mesh->surface);
-  int *place = clt_alloc((size_t)mesh->count, sizeof *place);
-  if (!mesh->elements || !mesh->surface || !place) {
-    free(place);
-    return out_of_memory(description, error);
-  }
-  order_elements(mesh, divisions, place);
-  place_elements(mesh, description, divisions, place);
-  gather_weights(mesh);
-  free(place);
-  return CLT_OK;
+  free(divisions);
+  return enough ? CLT_OK
+                : clt_fail(error, CLT_FAILED, "%s: out of memory for the light's mesh; use a smaller grid",
+                           description->path);
 }
 
 void clt_mesh_finish(clt_mesh *mesh) {
   free(mesh->elements);
   free(mesh->surface);
-  free(mesh->ends);
-  free(mesh->solid_angle);
-  free(mesh->start);
-  free(mesh->element);
-  free(mesh->weight);
+  clt_weights_finish(&mesh->lights);
   *mesh = (clt_mesh){0};
 }

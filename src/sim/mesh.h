@@ -1,40 +1,42 @@
-/* Where the projector's cells fall on the surfaces, and the elements that the surfaces are divided into. */
+/* The elements that surfaces are divided into, and what each cell has to do with them.
+ *
+ * With F the direct light, Phi_j = solid_angle_j intensity the flux of cell j, the rows of `lights` W, those of `sees`
+ * V and those of `mirrors` M, and D, K as in sim/light.h,
+ *   T = diag(F) + ((V + M) D ((I - K)^-1 - I) D W' + M diag(albedo / area) W') diag(Phi) / pi. */
 #ifndef CLT_SIM_MESH_H
 #define CLT_SIM_MESH_H
 
-#include "sim/description.h"
-#include "sim/visibility.h"
-
-enum { CLT_ELEMENTS_MAX = 4800, CLT_ELEMENTS_WANTED = 1000 };
-
-/* A sub-ray of a cell. */
-typedef struct clt_ray_end {
-  int surface;    /* that it lights from the front; -1: none */
-  int element;    /* of the mesh */
-  double share;   /* its solid angle over the cell's */
-  double falloff; /* cos / r^2, 1/m^2: irradiance per radiant intensity */
-  double s, t;    /* where on the surface */
-} clt_ray_end;
+#include "sim/cells.h"
+#include "sim/sights.h"
+#include "sim/weights.h"
 
 typedef struct clt_mesh {
-  /* The elements, small rectangles. Those that the projector lights come last, from number count - lit on. */
-  int count, lit;
+  /* The elements, small rectangles or triangles. Those that a cell lights, sees or mirrors come last, from number
+   * count - used on. */
+  int count, used;
   clt_rectangle *elements;
   int *surface; /* of each element */
-  /* cells * rays sub-rays, and the solid angle of each cell, sr */
-  int cells, rays;
-  clt_ray_end *ends;
-  double *solid_angle;
-  /* What cell i covers: the elements element[k], start[i] <= k < start[i+1], each by weight[k] of its solid angle. */
-  int *start, *element;
-  double *weight;
+  int cells;
+  clt_weights lights; /* of cell j: the elements that it lights, by shares of its solid angle */
+  /* of row i: the elements that the camera sees in it, by shares of what it sees. Where the camera stands at the
+   * projector these are the arrays of `lights`. */
+  clt_weights sees;
+  /* mirrors[c] of row i: the elements whose light the gloss of what the camera sees there throws to it, in channel c,
+   * times pi radiance over radiosity. No rows (start is NULL) without gloss; channels of equal gloss share arrays. */
+  clt_weights mirrors[CLT_SIM_CHANNELS_MAX];
 } clt_mesh;
 
-/* Traces the cells and divides the surfaces into elements about as large as the median footprint of a cell, smaller
- * where that gives fewer than CLT_ELEMENTS_WANTED, larger where it gives more than CLT_ELEMENTS_MAX. visibility is of
- * the description's surfaces. mesh was zeroed by the caller and is finished by it in either case. */
+/* How many elements there should be: at least `wanted`, at most `most`. */
+typedef struct clt_mesh_size {
+  int wanted, most;
+} clt_mesh_size;
+
+/* Divides the surfaces that exchange light into elements about as large as the median footprint of a cell, smaller
+ * where that gives fewer than size.wanted, larger where it gives more than size.most; then finds what the cells have to
+ * do with them. visibility is of the description's surfaces. mesh was zeroed by the caller and is finished by it in
+ * either case. */
 clt_status clt_mesh_init(clt_mesh *mesh, const clt_scene_description *description, const clt_visibility *visibility,
-                         clt_error *error);
+                         const clt_cells *cells, const clt_sights *sights, clt_mesh_size size, clt_error *error);
 void clt_mesh_finish(clt_mesh *mesh);
 
 #endif

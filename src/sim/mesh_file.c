@@ -41,7 +41,7 @@ static clt_status add_faces(clt_scene_description *description, const struct aiM
     if (mesh->mFaces[k].mNumIndices != 3) { /* points and lines */
       continue;
     }
-    if (description->surface_count == CLT_SURFACES_MAX) {
+    if (!clt_scene_reserve_surfaces(description, 1)) {
       return clt_fail(error, CLT_BAD_INPUT,
                       "has too many triangles: a scene takes at most %d flat surfaces; simplify it", CLT_SURFACES_MAX);
     }

@@ -4,7 +4,6 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
-#include "sim/light.h"
 #include "sim/state.h"
 
 static clt_status out_of_memory(const clt_scene *scene, clt_error *error) {
@@ -81,7 +80,7 @@ static clt_status take_transport(clt_scene *scene, clt_error *error) {
     scene->transport = scene->description.transport;
     scene->description.transport = NULL;
   } else {
-    status = clt_light_transport(&scene->description, &scene->transport, error);
+    status = clt_light_transport(&scene->description, &scene->transport, &scene->light, error);
   }
   scene->light_ms = 1e3 * clt_clock_since(start_ns);
   return status;

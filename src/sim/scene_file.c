@@ -160,7 +160,27 @@ clt_status clt_scene_read(const char *path, clt_scene_description *description, 
 
 void clt_scene_description_finish(clt_scene_description *description) {
   clt_transport_destroy(description->transport);
+  free(description->surfaces);
   description->transport = NULL;
+  description->surfaces = NULL;
+  description->surface_count = description->surface_room = 0;
+}
+
+bool clt_scene_reserve_surfaces(clt_scene_description *description, int more) {
+  int needed = description->surface_count + more, room = 2 * description->surface_room;
+  if (needed > CLT_SURFACES_MAX) {
+    return false;
+  }
+  if (needed > description->surface_room) {
+    room = room > needed ? room : needed;
+    clt_rectangle *grown = realloc(description->surfaces, (size_t)room * sizeof *grown);
+    if (grown == NULL) {
+      return false;
+    }
+    description->surfaces = grown;
+    description->surface_room = room;
+  }
+  return true;
 }
 
 double clt_ambient_most(const clt_scene_description *description) {

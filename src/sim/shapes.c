@@ -14,13 +14,9 @@ static void add(clt_scene_description *description, clt_rectangle side, clt_faci
   clt_rectangle_complete(added);
 }
 
-static bool fits(const clt_scene_description *description, int more) {
-  return description->surface_count + more <= CLT_SURFACES_MAX;
-}
-
 bool clt_shape_box(clt_scene_description *description, clt_vector corner, const clt_vector edges[3], clt_facing facing,
                    const double *albedo) {
-  if (!fits(description, 6)) {
+  if (!clt_scene_reserve_surfaces(description, 6)) {
     return false;
   }
   bool right_handed = vec_dot(vec_cross(edges[0], edges[1]), edges[2]) > 0.0;
@@ -40,7 +36,7 @@ static clt_vector on_circle(const clt_cylinder *cylinder, double angle) {
 
 bool clt_shape_cylinder(clt_scene_description *description, const clt_cylinder *cylinder, clt_facing facing,
                         const double *albedo) {
-  if (!fits(description, cylinder->pieces)) {
+  if (!clt_scene_reserve_surfaces(description, cylinder->pieces)) {
     return false;
   }
   for (int k = 0; k < cylinder->pieces; k++) {

@@ -7,12 +7,14 @@
 #include "counterlight/scene.h"
 #include "sim/description.h"
 #include "sim/effects/plan.h"
+#include "sim/light.h"
 #include "sim/timeline.h"
 
 struct clt_scene {
   clt_scene_description description;
   clt_transport *transport; /* T and b0 */
   double light_ms;          /* that computing or reading T took */
+  clt_light_facts light;    /* of a scene of surfaces */
   double *flood;            /* channels * cells values: T 1 */
   double *added;            /* channels * cells values: what the effects add to the transport's own black */
   double full_drive[CLT_SIM_CHANNELS_MAX]; /* most drive of a channel that reaches the surfaces */

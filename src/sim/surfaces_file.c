@@ -77,7 +77,7 @@ static bool read_rectangle(clt_section item, const double *albedo, clt_scene_des
     clt_section_fail(item, "u", "u and v must be longer than 1e-6 and perpendicular, so that they span a rectangle");
   }
   memcpy(surface.albedo, albedo, sizeof surface.albedo);
-  if (description->surface_count == CLT_SURFACES_MAX) {
+  if (!clt_scene_reserve_surfaces(description, 1)) {
     return false;
   }
   description->surfaces[description->surface_count++] = surface;

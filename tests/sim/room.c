@@ -58,6 +58,7 @@ void describe_view(clt_scene_description *description, int width, int height, cl
 }
 
 void add_surface(clt_scene_description *description, clt_vector corner, clt_vector u, clt_vector v, double albedo) {
+  assert_true(clt_scene_reserve_surfaces(description, 1));
   clt_rectangle *surface = &description->surfaces[description->surface_count++];
   *surface = (clt_rectangle){.corner = corner, .u = u, .v = v, .albedo = {albedo, albedo, albedo}};
   assert_true(clt_rectangle_complete(surface));

@@ -22,7 +22,8 @@ clt_scene *room_open(const room *made);
 /* The repository's data folder beside it, or NULL where it is not there. */
 const char *shared_file(const char *name, char path[1024]);
 
-/* A description without a file: grid, rays, projector looking from position to target with up = z, intensity 10. */
+/* A description without a file: grid, rays, projector looking from position to target with up = z, intensity 10; the
+ * test finishes it. */
 void describe_view(clt_scene_description *description, int width, int height, clt_vector position, clt_vector target);
 void add_surface(clt_scene_description *description, clt_vector corner, clt_vector u, clt_vector v, double albedo);
 

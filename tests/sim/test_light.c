@@ -8,13 +8,13 @@
 /* T of a description's channel in double, cells x cells. */
 static double *solve_transport(clt_light *light, const clt_scene_description *description, int channel) {
   clt_error error = {.status = CLT_OK};
-  if (light->description == NULL) {
+  if (light->layout.description == NULL) {
     assert_ok(clt_light_init(light, description, &error), error);
   }
   assert_ok(clt_light_solve(light, channel, &error), error);
-  size_t cells = (size_t)light->mesh.cells;
+  size_t cells = (size_t)light->layout.cells.count;
   double *transport = calloc(cells * cells, sizeof *transport);
-  double *scratch = calloc((size_t)light->mesh.lit, sizeof *scratch);
+  double *scratch = calloc((size_t)light->layout.mesh.used + 1, sizeof *scratch);
   assert_true(transport != NULL && scratch != NULL);
   for (size_t i = 0; i < cells; i++) {
     clt_light_row(light, channel, (int)i, &transport[i * cells], scratch);
@@ -45,7 +45,7 @@ static void describe_corner(clt_scene_description *description) {
 
 static double h_value(const clt_light *light, size_t i, size_t j) {
   size_t row = i < j ? i : j, column = i < j ? j : i;
-  return i == j ? 0.0 : light->exchange[column * (size_t)light->mesh.count + row];
+  return i == j ? 0.0 : light->exchange[column * (size_t)light->layout.mesh.count + row];
 }
 
 /* The picture's axes are those that the reference states, and row 0 is at the top. */
@@ -73,6 +73,7 @@ static void projector_axes(void **state) {
   }
   double a = 0.44, b = 0.33; /* of a rectangle seen along its axis: 4 asin of the product of the half-angles' sines */
   assert_near(total, 4 * asin(a * b / sqrt((1 + a * a) * (1 + b * b))), 1e-5);
+  clt_scene_description_finish(&view);
 }
 
 /* Mean direct radiance over a cell of an 8 x 6 picture that meets a wall of albedo 0.5 squarely at 3 m. With
@@ -105,6 +106,35 @@ static void flat_wall_is_diagonal(void **state) {
   }
   free(transport);
   clt_light_finish(&light);
+  clt_scene_description_finish(&wall);
+}
+
+/* Only surfaces that exchange light which reaches the picture are divided; where there are none, nothing is computed
+ * beside direct light. */
+static void only_what_exchanges_is_meshed(void **state) {
+  (void)state;
+  /* wall and floor; with a screen between; with a black floor; with two walls out of sight that nothing lights */
+  for (int k = 0; k < 4; k++) {
+    clt_scene_description scene;
+    describe_view(&scene, 8, 6, (clt_vector){0, -3, 1}, (clt_vector){0, 0, 1});
+    add_surface(&scene, (clt_vector){-2, 0, 0}, (clt_vector){4, 0, 0}, (clt_vector){0, 0, 2}, 0.5);
+    add_surface(&scene, (clt_vector){-2, -9, -1}, (clt_vector){4, 0, 0}, (clt_vector){0, 9, 0}, k == 2 ? 0.0 : 0.5);
+    if (k == 1) {
+      add_surface(&scene, (clt_vector){-20, -20, -0.5}, (clt_vector){0, 40, 0}, (clt_vector){40, 0, 0}, 0.5);
+    }
+    if (k == 3) {
+      add_surface(&scene, (clt_vector){-1, 8, 3}, (clt_vector){0, 0, 1}, (clt_vector){0, 1, 0}, 0.5);
+      add_surface(&scene, (clt_vector){-2, 8, 3}, (clt_vector){0, 1, 0}, (clt_vector){0, 0, 1}, 0.5);
+      scene.surfaces[1].albedo[0] = 0.0;
+    }
+    clt_light light = {0};
+    clt_error error = {.status = CLT_OK};
+    assert_ok(clt_light_init(&light, &scene, &error), error);
+    assert_int_equal(light.layout.sights.exchanging, k == 0 ? 2 : 0);
+    assert_true((light.layout.mesh.count > 0) == (k == 0) && (light.exchange != NULL) == (k == 0));
+    clt_light_finish(&light);
+    clt_scene_description_finish(&scene);
+  }
 }
 
 /* Rows of G sum to at most 1, and to 1 in a closed box. */
@@ -123,15 +153,16 @@ static void row_sums_of_a_box(void **state) {
   clt_light light = {0};
   clt_error error = {.status = CLT_OK};
   assert_ok(clt_light_init(&light, &box, &error), error);
-  for (size_t i = 0; i < (size_t)light.mesh.count; i++) {
+  for (size_t i = 0; i < (size_t)light.layout.mesh.count; i++) {
     double sum = 0.0;
-    for (size_t j = 0; j < (size_t)light.mesh.count; j++) {
+    for (size_t j = 0; j < (size_t)light.layout.mesh.count; j++) {
       sum += h_value(&light, i, j);
     }
-    sum /= clt_rectangle_area(&light.mesh.elements[i]);
+    sum /= clt_rectangle_area(&light.layout.mesh.elements[i]);
     assert_near(sum, 1.0, 1e-10);
   }
   clt_light_finish(&light);
+  clt_scene_description_finish(&box);
 }
 
 /* omega_i T_ij = omega_j T_ji, in scenes with several walls, a blocker and colours; and no light is negative. */
@@ -142,8 +173,8 @@ static void reciprocity(void **state) {
   clt_light light = {0};
   for (int c = 0; c < 3; c++) {
     double *transport = solve_transport(&light, &corner, c);
-    size_t cells = (size_t)light.mesh.cells;
-    const double *omega = light.mesh.solid_angle;
+    size_t cells = (size_t)light.layout.cells.count;
+    const double *omega = light.layout.cells.solid_angle;
     double defect = 0.0, largest = 0.0;
     for (size_t i = 0; i < cells; i++) {
       for (size_t j = 0; j < cells; j++) {
@@ -157,6 +188,7 @@ static void reciprocity(void **state) {
     free(transport);
   }
   clt_light_finish(&light);
+  clt_scene_description_finish(&corner);
 }
 
 /* Flux-scaled T of bright walls has only positive eigenvalues. */
@@ -167,12 +199,13 @@ static void positive_definite(void **state) {
   clt_light light = {0};
   double *transport = solve_transport(&light, &dihedral, 0), values[108];
   for (size_t k = 0; k < 108 * 108; k++) {
-    transport[k] *= light.mesh.solid_angle[k / 108];
+    transport[k] *= light.layout.cells.solid_angle[k / 108];
   }
   assert_int_equal(LAPACKE_dsyev(LAPACK_ROW_MAJOR, 'N', 'U', 108, transport, 108, values), 0);
   assert_true(values[0] > 0.1 * values[107]);
   free(transport);
   clt_light_finish(&light);
+  clt_scene_description_finish(&dihedral);
 }
 
 /* The radiosity of the fully lit scene, iterated here with the mesh's H, sees what T 1 sees. */
@@ -183,15 +216,15 @@ static void white_by_iteration(void **state) {
   clt_light light = {0};
   const int channel = 1;
   double *transport = solve_transport(&light, &corner, channel);
-  const clt_mesh *mesh = &light.mesh;
+  const clt_mesh *mesh = &light.layout.mesh;
+  const clt_cells *own = &light.layout.cells;
   size_t count = (size_t)mesh->count, cells = (size_t)mesh->cells;
   double *direct = calloc(3 * count, sizeof *direct), *bounced = direct + count, *next = bounced + count;
-  for (size_t k = 0; k < cells * (size_t)mesh->rays; k++) {
-    const clt_ray_end *end = &mesh->ends[k];
-    if (end->surface >= 0) {
-      const clt_rectangle *element = &mesh->elements[end->element];
-      direct[end->element] += element->albedo[channel] * 10.0 * mesh->solid_angle[k / (size_t)mesh->rays] * end->share /
-                              clt_rectangle_area(element);
+  for (size_t j = 0; j < cells; j++) {
+    for (int k = mesh->lights.start[j]; k < mesh->lights.start[j + 1]; k++) {
+      const clt_rectangle *element = &mesh->elements[mesh->lights.element[k]];
+      direct[mesh->lights.element[k]] +=
+          element->albedo[channel] * 10.0 * own->solid_angle[j] * mesh->lights.weight[k] / clt_rectangle_area(element);
     }
   }
   for (int bounce = 0; bounce < 60; bounce++) {
@@ -206,9 +239,8 @@ static void white_by_iteration(void **state) {
   }
   for (size_t i = 0; i < cells; i++) {
     double seen = clt_light_direct(&light, channel, (int)i), sum = 0.0;
-    for (int ray = 0; ray < mesh->rays; ray++) {
-      const clt_ray_end *end = &mesh->ends[i * (size_t)mesh->rays + (size_t)ray];
-      seen += end->surface >= 0 ? end->share * bounced[end->element] / M_PI : 0.0;
+    for (int k = mesh->sees.start[i]; k < mesh->sees.start[i + 1]; k++) {
+      seen += mesh->sees.weight[k] * bounced[mesh->sees.element[k]] / M_PI;
     }
     for (size_t j = 0; j < cells; j++) {
       sum += transport[i * cells + j];
@@ -218,6 +250,7 @@ static void white_by_iteration(void **state) {
   free(direct);
   free(transport);
   clt_light_finish(&light);
+  clt_scene_description_finish(&corner);
 }
 
 /* A panel with its black back to the projector shadows the wall behind it, and only that. */
@@ -226,7 +259,8 @@ static void panel_casts_shadow(void **state) {
   clt_scene_description open_wall, shadowed;
   describe_view(&open_wall, 8, 6, (clt_vector){0, -3, 0}, (clt_vector){0, 0, 0});
   add_surface(&open_wall, (clt_vector){-2, 0, -2}, (clt_vector){4, 0, 0}, (clt_vector){0, 0, 4}, 0.5);
-  shadowed = open_wall;
+  describe_view(&shadowed, 8, 6, (clt_vector){0, -3, 0}, (clt_vector){0, 0, 0});
+  add_surface(&shadowed, (clt_vector){-2, 0, -2}, (clt_vector){4, 0, 0}, (clt_vector){0, 0, 4}, 0.5);
   /* at half the distance: columns 0..3 and rows 0..2 of the picture */
   add_surface(&shadowed, (clt_vector){-1, -1.5, 0}, (clt_vector){0, 0, 1}, (clt_vector){1, 0, 0}, 0.5);
   clt_light open_light = {0}, shadow_light = {0};
@@ -241,6 +275,8 @@ static void panel_casts_shadow(void **state) {
   free(dark);
   clt_light_finish(&open_light);
   clt_light_finish(&shadow_light);
+  clt_scene_description_finish(&open_wall);
+  clt_scene_description_finish(&shadowed);
 }
 
 static void read_dataset(const char *path, const char *name, double *values) {
@@ -296,14 +332,16 @@ static void path_tracer_agrees(void **state) {
   free(reference);
   free(transport);
   clt_light_finish(&light);
+  clt_scene_description_finish(&dihedral);
 }
 
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(projector_axes),     cmocka_unit_test(flat_wall_is_diagonal),
-      cmocka_unit_test(row_sums_of_a_box),  cmocka_unit_test(reciprocity),
-      cmocka_unit_test(positive_definite),  cmocka_unit_test(white_by_iteration),
-      cmocka_unit_test(panel_casts_shadow), cmocka_unit_test(path_tracer_agrees),
+      cmocka_unit_test(row_sums_of_a_box),  cmocka_unit_test(only_what_exchanges_is_meshed),
+      cmocka_unit_test(reciprocity),        cmocka_unit_test(positive_definite),
+      cmocka_unit_test(white_by_iteration), cmocka_unit_test(panel_casts_shadow),
+      cmocka_unit_test(path_tracer_agrees),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

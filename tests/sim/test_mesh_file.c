@@ -31,6 +31,7 @@ static clt_scene_description *read_cube(clt_facing facing) {
   clt_mesh_place place = {{1, 2, 3}, 0.5};
   clt_status status = add_text(scene, CUBE, &place, facing, &error);
   if (status == CLT_FAILED) { /* a build without meshes */
+    clt_scene_description_finish(scene);
     free(scene);
     skip();
   }
@@ -53,6 +54,7 @@ static void a_cube_of_triangles(void **state) {
     }
     assert_near(area, 1.5, 1e-12);
     assert_near(volume, k == 0 ? 0.125 : -0.125, 1e-12);
+    clt_scene_description_finish(scene);
     free(scene);
   }
 }
@@ -73,31 +75,55 @@ static void triangles_exchange_as_squares_do(void **state) {
     assert_near(opposed / clt_rectangle_area(&scene->surfaces[i]), 0.199825, 2e-4);
     assert_near((opposed + adjacent) / clt_rectangle_area(&scene->surfaces[i]), 1.0, 1e-4);
   }
+  clt_scene_description_finish(scene);
   free(scene);
 }
 
-/* The elements that the triangles are divided into cover them, and every ray's end lies in the element it is said to
- * light. */
+/* Share of a cell's rays that end in an element, or on its edge. */
+static double share_within(const clt_layout *layout, const clt_ray_end *ends, int number) {
+  const clt_scene_description *scene = layout->description;
+  const clt_rectangle *element = &layout->mesh.elements[number];
+  double share = 0.0;
+  for (int ray = 0; ray < scene->rays * scene->rays; ray++) {
+    const clt_ray_end *end = &ends[ray];
+    if (end->surface == layout->mesh.surface[number]) {
+      const clt_rectangle *surface = &scene->surfaces[end->surface];
+      clt_vector from = vec_add(vec_along(surface->corner, end->s, surface->u, end->t, surface->v), element->normal);
+      clt_hit hit = clt_hit_on_plane(element, from, vec_scale(-1.0, element->normal));
+      share += hit.s >= -1e-9 && hit.t >= -1e-9 && hit.s + hit.t <= 1.0 + 1e-9 ? end->share : 0.0;
+    }
+  }
+  return share;
+}
+
+/* The elements that the triangles are divided into cover them, and every ray's end lies in an element that the cell is
+ * said to light, by the share of those that end in it. */
 static void ends_lie_in_their_elements(const clt_scene_description *scene) {
   clt_light light = {0};
   clt_error error = {.status = CLT_OK};
   assert_ok(clt_light_init(&light, scene, &error), error);
+  const clt_mesh *mesh = &light.layout.mesh;
   double area = 0.0;
-  for (int k = 0; k < light.mesh.count; k++) {
-    area += clt_rectangle_area(&light.mesh.elements[k]);
+  for (int k = 0; k < mesh->count; k++) {
+    area += clt_rectangle_area(&mesh->elements[k]);
   }
   for (int k = 0; k < scene->surface_count; k++) {
     area -= clt_rectangle_area(&scene->surfaces[k]);
   }
   assert_near(area, 0.0, 1e-9);
-  for (int k = 0; k < light.mesh.cells * light.mesh.rays; k++) {
-    const clt_ray_end *end = &light.mesh.ends[k];
-    if (end->surface >= 0) {
-      const clt_rectangle *surface = &scene->surfaces[end->surface], *element = &light.mesh.elements[end->element];
-      clt_vector from = vec_add(vec_along(surface->corner, end->s, surface->u, end->t, surface->v), element->normal);
-      clt_hit hit = clt_hit_on_plane(element, from, vec_scale(-1.0, element->normal));
-      assert_true(hit.s >= -1e-9 && hit.t >= -1e-9 && hit.s + hit.t <= 1.0 + 1e-9);
+  for (int cell = 0; cell < mesh->cells; cell++) {
+    clt_ray_end ends[CLT_CELL_RAYS_MAX];
+    double there = 0.0, listed = 0.0;
+    clt_cell_trace(scene, light.layout.visibility, cell, ends);
+    for (int ray = 0; ray < scene->rays * scene->rays; ray++) {
+      there += ends[ray].surface >= 0 ? ends[ray].share : 0.0;
     }
+    for (int k = mesh->lights.start[cell]; k < mesh->lights.start[cell + 1]; k++) {
+      double within = share_within(&light.layout, ends, mesh->lights.element[k]);
+      listed += mesh->lights.weight[k];
+      assert_true(mesh->lights.weight[k] > 0.0 && mesh->lights.weight[k] <= within + 1e-12);
+    }
+    assert_near(listed, there, 1e-12);
   }
   clt_light_finish(&light);
 }
@@ -122,8 +148,9 @@ static void divided_triangles_light_alike(void **state) {
   assert_ok(status, error);
   ends_lie_in_their_elements(&triangles);
   clt_transport *t[2] = {NULL, NULL};
-  assert_ok(clt_light_transport(&walls, &t[0], &error), error);
-  assert_ok(clt_light_transport(&triangles, &t[1], &error), error);
+  clt_light_facts facts;
+  assert_ok(clt_light_transport(&walls, &t[0], &facts, &error), error);
+  assert_ok(clt_light_transport(&triangles, &t[1], &facts, &error), error);
   double sums[2][24];
   for (int k = 0; k < 2; k++) {
     clt_transport_row_sums(t[k], 0, sums[k]);
@@ -132,6 +159,8 @@ static void divided_triangles_light_alike(void **state) {
   for (int i = 0; i < 24; i++) {
     assert_near(sums[1][i], sums[0][i], 0.015 * sums[0][i]);
   }
+  clt_scene_description_finish(&walls);
+  clt_scene_description_finish(&triangles);
 }
 
 static void mistakes_are_refused(void **state) {
@@ -142,8 +171,8 @@ static void mistakes_are_refused(void **state) {
       {"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "no area"},
       {"this is no mesh", "mesh.obj"},
   };
-  free(read_cube(CLT_FACING_OUT)); /* skips where meshes are not read */
-  clt_scene_description *scene = calloc(1, sizeof *scene);
+  clt_scene_description *scene = read_cube(CLT_FACING_OUT); /* skips where meshes are not read */
+  scene->surface_count = 0;
   clt_mesh_place place = {{0, 0, 0}, 1.0};
   for (size_t k = 0; k < sizeof refusals / sizeof refusals[0]; k++) {
     clt_error error = {.status = CLT_OK};
@@ -157,6 +186,7 @@ static void mistakes_are_refused(void **state) {
   assert_int_equal(add_text(scene, CUBE, &place, CLT_FACING_OUT, &error), CLT_BAD_INPUT);
   assert_non_null(strstr(error.message, "too many triangles"));
   assert_int_equal(scene->surface_count, CLT_SURFACES_MAX - 11);
+  clt_scene_description_finish(scene);
   free(scene);
 }
 

@@ -45,6 +45,7 @@ static void boxes_are_closed(void **state) {
     assert_near(found.area, 2 * (2.0 * 3.0 + 2.0 * 0.5 + 3.0 * 0.5), 1e-12);
     assert_near(found.volume, facing == CLT_FACING_OUT ? 3.0 : -3.0, 1e-12);
     assert_near(vec_length(found.directed), 0.0, 1e-12);
+    clt_scene_description_finish(scene);
     free(scene);
   }
 }
@@ -67,6 +68,7 @@ static void cylinders_are_prisms(void **state) {
   found = measure(scene, 12);
   assert_near(found.directed.x, 0.0, 1e-12);
   assert_near(found.directed.y, -0.8 * 1.5, 1e-12); /* from +x over +y to -x, seen from within */
+  clt_scene_description_finish(scene);
   free(scene);
 }
 
@@ -78,6 +80,7 @@ static void what_does_not_fit_is_left_out(void **state) {
   assert_true(clt_shape_cylinder(scene, &many, CLT_FACING_OUT, grey));
   assert_false(clt_shape_box(scene, edges[0], edges, CLT_FACING_OUT, grey));
   assert_int_equal(scene->surface_count, CLT_SURFACES_MAX - 5);
+  clt_scene_description_finish(scene);
   free(scene);
 }
 

@@ -26,36 +26,33 @@ static double exchanging_pairs(const clt_scene *scene) {
   return (double)most;
 }
 
-static int facing_surfaces(const clt_scene_description *description) {
-  int pairs = 0;
-  for (int a = 0; a < description->surface_count; a++) {
-    for (int b = 0; b < a; b++) {
-      pairs += clt_rectangles_face(&description->surfaces[a], &description->surfaces[b]);
-    }
-  }
-  return pairs;
+/* A transport file says nothing but its entries. */
+static bool called_for_by_file(const clt_scene *scene, char *why) {
+  double pairs = exchanging_pairs(scene);
+  snprintf(why, CLT_EFFECT_WHY_MAX,
+           pairs < 0.0    ? "the transport file says how cells light each other"
+           : pairs == 0.0 ? "in the transport file no cell lights another"
+                          : "in the transport file %.0f pairs of cells exchange light",
+           pairs);
+  return pairs != 0.0;
 }
 
 static bool called_for(const clt_scene *scene, char *why) {
-  const clt_scene_description *description = &scene->description;
-  double pairs = exchanging_pairs(scene);
-  int surfaces = description->surface_count, facing = facing_surfaces(description);
+  int surfaces = scene->description.surface_count;
+  const clt_light_facts *light = &scene->light;
   if (surfaces == 0) {
-    snprintf(why, CLT_EFFECT_WHY_MAX,
-             pairs < 0.0    ? "the transport file says how cells light each other"
-             : pairs == 0.0 ? "in the transport file no cell lights another"
-                            : "in the transport file %.0f pairs of cells exchange light",
-             pairs);
-  } else if (pairs != 0.0) {
-    snprintf(why, CLT_EFFECT_WHY_MAX, "%d of %d pairs of surfaces face each other: %.0f pairs of cells exchange light",
-             facing, surfaces * (surfaces - 1) / 2, pairs);
+    return called_for_by_file(scene, why);
+  }
+  if (light->exchanging > 0) {
+    snprintf(why, CLT_EFFECT_WHY_MAX, "%d of %d pairs of surfaces face each other: %d of %d surfaces exchange light",
+             light->facing, surfaces * (surfaces - 1) / 2, light->exchanging, surfaces);
   } else {
     snprintf(why, CLT_EFFECT_WHY_MAX,
-             surfaces == 1 ? "one flat surface: nothing to exchange light with"
-             : facing == 0 ? "no two surfaces face each other"
-                           : "the surfaces that face each other send nothing back into the picture");
+             surfaces == 1        ? "one flat surface: nothing to exchange light with"
+             : light->facing == 0 ? "no two surfaces face each other"
+                                  : "the surfaces that face each other send nothing back into the picture");
   }
-  return pairs != 0.0;
+  return light->exchanging > 0;
 }
 
 static void finish(void *state) {
