@@ -52,7 +52,8 @@ typedef struct clt_solve_options {
   double deadline_s;   /* wall time after which the best drive so far is returned; <= 0 means none */
   const double *start; /* warm start of clt_solve: channels * cols drive values, or NULL for zero */
   bool together;       /* the channels as one system: they iterate in step, and storage that they share is read once for
-                          all. The methods that need the entries of T solve channel by channel all the same */
+                          all; each still reaches the tolerance. The methods that need the entries of T solve channel by
+                          channel all the same */
   bool discrepancy; /* stop where only noise is left (the discrepancy principle): at ||r|| <= 1.05 sqrt(M) sqrt(noise^2
                        + sigma_T^2 ||x||^2), M lit rows, sigma_T from the transport's sigma, if `tolerance` asks for
                        less */
@@ -63,6 +64,7 @@ typedef struct clt_solve_result {
   char method[24];        /* the method that gave the answer */
   char reason[200];       /* why this one, in one sentence */
   int iterations;         /* the most that any channel took */
+  long products;          /* with T or T', the most that any channel took; channels together count as one */
   double residual;        /* ||T x - b|| / ||b|| over lit rows of every channel, of the x that is returned */
   double seconds;         /* wall time of the solve */
   double prepare_seconds; /* wall time that making the method ready took, once for every solve with the solver */

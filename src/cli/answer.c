@@ -28,6 +28,7 @@ void cli_json_add_compensation(json_t *object, const clt_compensation *compensat
   json_object_set_new(object, "method", json_string(solve->method));
   json_object_set_new(object, "reason", json_string(solve->reason));
   json_object_set_new(object, "iterations", json_integer(solve->iterations));
+  json_object_set_new(object, "products", json_integer(solve->products));
   json_object_set_new(object, "solve_ms", cli_json_number(1e3 * solve->seconds));
   json_object_set_new(object, "residual", cli_json_number(solve->residual));
   json_object_set_new(object, "converged", json_boolean(solve->converged));

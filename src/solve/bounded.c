@@ -34,12 +34,17 @@ void clt_box_refresh(clt_box *box) {
   clt_box_refresh_gradient(box);
 }
 
-bool clt_box_done(const clt_box *box) {
-  return box->optimality <= box->target || !clt_run_may_go_on(box->run);
-}
-
 static double residual_norm(const clt_box *box) {
   return sqrt(2 * box->objective);
+}
+
+/* Optimal, or no further from the target than noise is. */
+static bool is_reached(const clt_box *box) {
+  return box->optimality <= box->target || residual_norm(box) <= clt_run_noise(box->run, box->system);
+}
+
+bool clt_box_done(const clt_box *box) {
+  return is_reached(box) || !clt_run_may_go_on(box->run);
 }
 
 /* One spectral step. With d = P(l - lambda g) - l and q = S d the objective along d is known exactly,
@@ -142,10 +147,11 @@ static bool open_box(clt_box *box, clt_system *system, clt_run *run) {
     *vectors[i] = clt_system_vector(system, i);
   }
   /* the target is relative to the projected gradient at x = 0, where r = b and g = -S' b */
-  memset(box->direction, 0, system->cols * sizeof(double));
   clt_system_apply_transposed(system, system->wanted, box->gradient);
-  cblas_dscal((blasint)system->cols, -1, box->gradient, 1);
-  double start = optimality(box, box->direction, box->gradient);
+  for (size_t j = 0; j < system->cols; j++) {
+    box->direction[j] = clt_box_project(box, j, box->gradient[j]);
+  }
+  double start = clt_system_least_norm(system, box->direction, system->cols);
   if (start == 0) {
     memset(system->light, 0, system->cols * sizeof(double));
     clt_run_open(run, system->wanted_norm);
@@ -177,7 +183,7 @@ static clt_outcome run_bounded(clt_system *system, clt_run *run) {
     stale = better ? 0 : stale + 1;
     least = fmin(least, box.optimality);
   }
-  return box.optimality <= box.target ? CLT_RUN_CONVERGED : CLT_RUN_STOPPED;
+  return is_reached(&box) ? CLT_RUN_CONVERGED : CLT_RUN_STOPPED;
 }
 
 const clt_method clt_method_bounded = {

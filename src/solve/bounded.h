@@ -27,7 +27,7 @@ static inline double clt_box_project(const clt_box *box, size_t j, double value)
 void clt_box_refresh(clt_box *box);
 /* The same where residual is known already. */
 void clt_box_refresh_gradient(clt_box *box);
-bool clt_box_done(const clt_box *box); /* optimal, or told to stop */
+bool clt_box_done(const clt_box *box); /* optimal, down in the noise, or told to stop */
 
 /* Minimises over the face of cells that are not held at a bound by the gradient, then projects. `share` is the part of
  * the face's gradient that may be left. False where no projected point along the way is better. */

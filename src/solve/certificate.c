@@ -200,7 +200,26 @@ static double bound_norm(clt_system *system) {
   return sqrt(most_row * most_column);
 }
 
-static void certify_channel(clt_certificate *certificate, clt_system *system, int c) {
+/* Products with the cells that take part must be numbers: a NaN in a dark row or column does no harm, one among the lit
+ * entries spoils every answer. */
+static clt_status check_finite(clt_system *system, int c, clt_error *error) {
+  double *ones = clt_system_vector(system, 0), *sums = clt_system_vector(system, 1);
+  for (size_t i = 0; i < system->cols; i++) {
+    ones[i] = system->lit[i] ? system->first_bounce[i] : 0;
+  }
+  clt_system_apply(system, ones, sums);
+  for (size_t i = 0; i < system->rows; i++) {
+    if (!isfinite(sums[i])) {
+      return clt_fail(error, CLT_BAD_INPUT,
+                      "row %zu of channel %d of the transport holds a value that is not a finite number; measure it "
+                      "again, or set the row and its cell's column to 0",
+                      i, c);
+    }
+  }
+  return CLT_OK;
+}
+
+static clt_status certify_channel(clt_certificate *certificate, clt_system *system, int c, clt_error *error) {
   clt_channel_certificate *channel = &certificate->channel[c];
   size_t at = (size_t)c * system->cols;
   double *first_bounce = certificate->first_bounce + at, *flux = certificate->flux + at;
@@ -209,17 +228,22 @@ static void certify_channel(clt_certificate *certificate, clt_system *system, in
   channel->lit = find_lit(system, c, first_bounce, lit, system->drive);
   channel->dark = system->cols - channel->lit;
   channel->white = quantile(first_bounce, lit, system->cols, 0.5, system->drive);
+  clt_system_select(system, c, first_bounce, lit);
+  clt_status status = check_finite(system, c, error);
+  if (status != CLT_OK) {
+    return status;
+  }
   if (!system->square) {
     for (size_t i = 0; i < system->cols; i++) {
       flux[i] = lit[i];
     }
     channel->radius_high = channel->norm_high = channel->reciprocity = INFINITY;
-    return;
+    return CLT_OK;
   }
-  clt_system_select(system, c, first_bounce, lit);
   certify_radius(system, channel);
   channel->norm_high = bound_norm(system);
   channel->reciprocity = clt_flux_weights(system, flux);
+  return CLT_OK;
 }
 
 clt_status clt_certify(const clt_transport *transport, clt_certificate **out, clt_error *error) {
@@ -245,7 +269,7 @@ clt_status clt_certify(const clt_transport *transport, clt_certificate **out, cl
     status = clt_system_reserve(&system, CLT_FLUX_VECTORS, error);
   }
   for (int c = 0; status == CLT_OK && c < info.channels; c++) {
-    certify_channel(certificate, &system, c);
+    status = certify_channel(certificate, &system, c, error);
   }
   clt_system_finish(&system);
   if (status != CLT_OK) {

@@ -13,9 +13,13 @@ const clt_method *clt_choose_first(const clt_certificate *certificate, const clt
                                   : &clt_method_bounded;
 }
 
-const clt_method *clt_choose_next(const clt_method *broken, double reciprocity) {
-  const clt_method *linear = clt_method_linear(reciprocity);
-  return broken == linear ? &clt_method_gmres : linear;
+const clt_method *clt_choose_last(const clt_system *system) {
+  return system->square ? &clt_method_gmres : &clt_method_bounded;
+}
+
+const clt_method *clt_choose_next(const clt_method *broken, const clt_system *system) {
+  const clt_method *linear = clt_method_linear(system->reciprocity);
+  return broken == linear || !system->square ? clt_choose_last(system) : linear;
 }
 
 clt_status clt_choose_named(const char *name, const clt_method **out, clt_error *error) {

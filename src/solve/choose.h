@@ -6,8 +6,10 @@
 
 /* The method that `auto` runs first. */
 const clt_method *clt_choose_first(const clt_certificate *certificate, const clt_transport_info *info);
-/* What takes over from a method that broke; gmres is the last resort and never breaks. */
-const clt_method *clt_choose_next(const clt_method *broken, double reciprocity);
+/* What takes over from a method that broke on the system. */
+const clt_method *clt_choose_next(const clt_method *broken, const clt_system *system);
+/* The last resort, which never breaks: gmres, or bounded where rows != cols. */
+const clt_method *clt_choose_last(const clt_system *system);
 /* The method of that name, or CLT_BAD_INPUT with the names that there are. */
 clt_status clt_choose_named(const char *name, const clt_method **out, clt_error *error);
 /* CLT_BAD_INPUT with the reason where the certificate shows that the method cannot serve. */

@@ -64,8 +64,11 @@ const clt_method *clt_method_find(const char *name);
 /* The Krylov method that the reciprocity defect allows: pcg or gmres. */
 const clt_method *clt_method_linear(double reciprocity);
 
-/* The ||b - S l|| at which a run has done its work: tolerance ||b||, or, where it is asked for, what noise leaves of
- * the residual of system->light, 1.05 sqrt(sum sigma_c^2 + sum sigma_T^2 ||x||^2), if that is more. */
+/* What noise leaves of the residual of system->light, 1.05 sqrt(sum sigma_c^2 + sum sigma_T^2 ||x||^2); 0 where it was
+ * not asked for. */
+double clt_run_noise(const clt_run *run, const clt_system *system);
+/* The ||b - S l|| at which a run has done its work: tolerance ||b||, of the faintest channel where several are
+ * together, or what noise leaves if that is more. */
 double clt_run_target(const clt_run *run, const clt_system *system);
 /* The residual before the first iteration opens the curve. */
 void clt_run_open(clt_run *run, double norm);

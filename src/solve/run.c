@@ -11,9 +11,9 @@ static void append(clt_run *run, double norm) {
   }
 }
 
-double clt_run_target(const clt_run *run, const clt_system *system) {
+double clt_run_noise(const clt_run *run, const clt_system *system) {
   static const double SAFETY = 1.05;
-  double target = run->tolerance * system->wanted_norm, left = run->noise.observed;
+  double left = run->noise.observed;
   size_t cols = system->cols / (size_t)system->channels;
   for (int c = 0; c < system->channels; c++) {
     double squares = 0;
@@ -23,7 +23,11 @@ double clt_run_target(const clt_run *run, const clt_system *system) {
     }
     left += run->noise.entries[c] * squares;
   }
-  return fmax(target, SAFETY * sqrt(left));
+  return SAFETY * sqrt(left);
+}
+
+double clt_run_target(const clt_run *run, const clt_system *system) {
+  return fmax(run->tolerance * system->wanted_least, clt_run_noise(run, system));
 }
 
 void clt_run_open(clt_run *run, double norm) {

@@ -132,6 +132,10 @@ void clt_solver_destroy(clt_solver *solver) {
   free(solver);
 }
 
+static bool is_finite(const clt_system *system) {
+  return isfinite(clt_norm(system->cols, system->light));
+}
+
 /* Runs a method on the selected system, and what replaces it where it breaks. */
 static clt_status run_method(clt_job *job, const clt_method *method, clt_run *run, clt_outcome *outcome,
                              clt_error *error) {
@@ -143,6 +147,11 @@ static clt_status run_method(clt_job *job, const clt_method *method, clt_run *ru
     }
     *outcome = method->run(system, run);
     job->answer = method;
+    if (!is_finite(system)) {
+      clt_run_note(run, "it gave a value that is not finite");
+      memset(system->light, 0, system->cols * sizeof(double));
+      *outcome = method == clt_choose_last(system) ? CLT_RUN_STOPPED : CLT_RUN_BROKE;
+    }
     if (*outcome != CLT_RUN_BROKE) {
       return CLT_OK;
     }
@@ -150,7 +159,7 @@ static clt_status run_method(clt_job *job, const clt_method *method, clt_run *ru
       job->broken = method;
       memcpy(job->why, run->note, sizeof job->why);
     }
-    method = job->replacement = clt_choose_next(method, system->reciprocity);
+    method = job->replacement = clt_choose_next(method, system);
   }
 }
 
@@ -226,6 +235,7 @@ static clt_status solve_system(clt_job *job, int k, const double *wanted, double
   clt_run *run = &job->run[k];
   clt_status status = CLT_OK;
   clt_outcome outcome = CLT_RUN_CONVERGED;
+  long products = system->products;
   select_system(solver, k);
   clt_system_want(system, wanted + (size_t)k * system->rows);
   take_start(job, k);
@@ -247,6 +257,7 @@ static clt_status solve_system(clt_job *job, int k, const double *wanted, double
   }
   job->lit += count_lit(system);
   job->wanted_norm[k] = system->wanted_norm;
+  job->products[k] = system->products - products;
   write_drive(solver, drive + (size_t)k * system->cols);
   job->residual[k] = drive_residual(system, drive + (size_t)k * system->cols);
   *converged = outcome == CLT_RUN_CONVERGED;

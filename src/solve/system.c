@@ -1,8 +1,12 @@
 #include "solve/system.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 #include "base/memory.h"
+
+/* Of all channels together: a channel below this is not worth the iterations that its own tolerance would cost. */
+static const double FAINT = 1e-6;
 
 clt_status clt_system_init(clt_system *system, const clt_transport *transport, bool together, clt_error *error) {
   clt_transport_info info = clt_transport_describe(transport);
@@ -60,6 +64,17 @@ void clt_system_want(clt_system *system, const double *wanted) {
     system->wanted[i] = clt_system_row_is_lit(system, i) ? wanted[i] : 0;
   }
   system->wanted_norm = clt_norm(system->rows, system->wanted);
+  system->wanted_least = clt_system_least_norm(system, system->wanted, system->rows);
+}
+
+double clt_system_least_norm(const clt_system *system, const double *values, size_t count) {
+  size_t part = count / (size_t)system->channels;
+  double least = INFINITY, whole = clt_norm(count, values);
+  for (int c = 0; c < system->channels; c++) {
+    double norm = clt_norm(part, values + (size_t)c * part);
+    least = norm > 0 ? fmin(least, norm) : least;
+  }
+  return fmax(fmin(least, whole), FAINT * whole);
 }
 
 clt_status clt_system_reserve(clt_system *system, size_t vectors, clt_error *error) {
@@ -119,7 +134,7 @@ void clt_system_apply_transposed(clt_system *system, const double *r, double *ou
   drop_dark_rows(system, system->seen);
   apply_transport_transposed(system, system->seen, out);
   for (size_t j = 0; j < system->cols; j++) {
-    out[j] *= system->scale[j];
+    out[j] = system->lit[j] ? out[j] * system->scale[j] : 0; /* a dark column may hold NaN */
   }
   system->products++;
 }

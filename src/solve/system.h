@@ -33,6 +33,7 @@ typedef struct clt_system {
   double *wanted;       /* b; rows values, 0 at dark rows */
   double *light;        /* l, the unknown: the start before a method runs, its best answer after; cols values */
   double wanted_norm;   /* ||b|| */
+  double wanted_least;  /* the least ||b|| of its channels that is not 0: each is to reach a tolerance of its own */
   long products;        /* with T or T' */
 
   double *pool; /* a method's vectors of max(rows, cols) values; they hold nothing between two runs */
@@ -46,6 +47,8 @@ void clt_system_finish(clt_system *system); /* accepts a zeroed system */
 void clt_system_select(clt_system *system, int channel, const double *first_bounce, const unsigned char *lit);
 /* Takes b from rows values, dropping dark rows. */
 void clt_system_want(clt_system *system, const double *wanted);
+/* The least norm of the channels of `values` (count of all) that is not 0, but at least a millionth of that of all. */
+double clt_system_least_norm(const clt_system *system, const double *values, size_t count);
 bool clt_system_row_is_lit(const clt_system *system, size_t row);
 /* Makes room for a method's vectors. */
 clt_status clt_system_reserve(clt_system *system, size_t vectors, clt_error *error);

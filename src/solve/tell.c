@@ -76,6 +76,9 @@ void clt_job_tell(const clt_job *job, bool converged, clt_solve_result *result) 
     if (job->run[c].iterations > result->iterations) {
       result->iterations = job->run[c].iterations;
     }
+    if (job->products[c] > result->products) {
+      result->products = job->products[c];
+    }
   }
   combine_curves(job, wanted_norm, result);
   snprintf(result->method, sizeof result->method, "%s", job->answer->name);
