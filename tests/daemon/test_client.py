@@ -2,9 +2,8 @@
 import json
 import os
 import subprocess
-import threading
 
-from exhibit import PATIENCE, exhibit, main, wait_for
+from exhibit import PATIENCE, exhibit, main
 
 PROGRAM = os.environ["CLT_PROGRAM"]
 
@@ -95,21 +94,12 @@ def without_a_daemon_it_says_what_to_do():
         assert code == 2 and "at most 107" in said, said
         run.start()
         run.wait_state("showing")
-        lines = []
-        def watch():
-            lines.append(counterlight(run, "watch", "--until", "stopping"))
-        watcher = threading.Thread(target=watch)
-        watcher.start()
-        wait_for("the watcher", lambda: len(os.listdir(f"/proc/{run.process.pid}/fd")) and subscribed(run))
+        watcher = subprocess.Popen([PROGRAM, "watch", "--until", "stopping"], stdout=subprocess.PIPE, text=True,
+                                   env={**os.environ, "COUNTERLIGHT_SOCKET": str(run.socket)})
+        assert watcher.stdout.readline().startswith("showing"), "the state that is comes first"
         run.stop()
-        watcher.join(PATIENCE)
-        assert lines[0][0] == 0 and "stopping" in lines[0][1], lines
-
-
-def subscribed(run):
-    """True once the daemon serves one connection beside this one's own."""
-    with open("/proc/net/unix") as sockets:
-        return sum(str(run.socket) in line and line.split()[5] == "03" for line in sockets) >= 1
+        out, _ = watcher.communicate(timeout=PATIENCE)
+        assert watcher.returncode == 0 and "stopping" in out, out
 
 
 def own_places_are_found():
