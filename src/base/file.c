@@ -114,3 +114,24 @@ clt_status clt_file_write(const char *path, const void *bytes, size_t size, clt_
   }
   return clt_file_commit(temporary, path, error);
 }
+
+clt_status clt_text_open(clt_text *text, const char *path, clt_error *error) {
+  *text = (clt_text){0};
+  if (snprintf(text->path, sizeof text->path, "%s", path) >= (int)sizeof text->path) {
+    return clt_fail(error, CLT_BAD_INPUT, "%.60s...: the path is too long", path);
+  }
+  text->to = open_memstream(&text->bytes, &text->size);
+  return text->to != NULL ? CLT_OK : clt_fail(error, CLT_FAILED, "%s: not enough memory to write it", path);
+}
+
+clt_status clt_text_close(clt_text *text, clt_status status, clt_error *error) {
+  if (text->to != NULL && fclose(text->to) != 0 && status == CLT_OK) {
+    status = clt_fail(error, CLT_FAILED, "%s: not enough memory to write it", text->path);
+  }
+  if (status == CLT_OK) {
+    status = clt_file_write(text->path, text->bytes, text->size, error);
+  }
+  free(text->bytes);
+  *text = (clt_text){0};
+  return status;
+}

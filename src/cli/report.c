@@ -1,43 +1,10 @@
 /* The demo's report: what was asked, what was seen, and how it came about, in one page without outside resources. */
 #include "cli/report.h"
 
-#include <errno.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/file.h"
-
-static const char head[] =
-    "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
-    "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-    "<meta name=\"color-scheme\" content=\"light dark\">\n"
-    "<title>counterlight: what the room shows</title>\n<style>\n"
-    ":root{--paper:#fbfaf7;--ink:#22242a;--soft:#6a6d76;--line:#dddad2;--card:#ffffff;--mark:#c2410c}\n"
-    "@media (prefers-color-scheme:dark){:root{--paper:#14151a;--ink:#e8e6e1;--soft:#9a9ca6;--line:#2c2e37;"
-    "--card:#1c1e25;--mark:#fb923c}}\n"
-    "*{box-sizing:border-box}\n"
-    "body{margin:0;background:var(--paper);color:var(--ink);font:17px/1.55 system-ui,\"Segoe UI\",\"DejaVu Sans\","
-    "sans-serif}\n"
-    "main{max-width:1080px;margin:0 auto;padding:48px 24px 72px}\n"
-    "h1{font-size:2.1rem;line-height:1.15;margin:0 0 .4em;letter-spacing:-.02em}\n"
-    "h2{font-size:1.15rem;margin:2.6em 0 .7em}\n"
-    ".lead{font-size:1.28rem;line-height:1.45;max-width:46em;margin:0 0 .5em}.lead b{color:var(--mark)}\n"
-    ".soft,figcaption span{color:var(--soft)}\n"
-    ".pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(420px,100%),1fr));gap:22px}\n"
-    "figure{margin:0;background:var(--card);border:1px solid var(--line);border-radius:10px;overflow:hidden}\n"
-    "figure img{display:block;width:100%;image-rendering:pixelated;background:#000}\n"
-    "figcaption{padding:10px 14px 12px;line-height:1.4}figcaption b{display:block}figcaption span{font-size:.88rem}\n"
-    "table{border-collapse:collapse;width:100%}td{padding:7px 12px 7px 0;border-bottom:1px solid var(--line);"
-    "vertical-align:top}\n"
-    "td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}\n"
-    "svg{display:block;width:100%;height:auto}svg text{fill:var(--soft);font-size:13px}svg .title{fill:var(--ink)}\n"
-    "svg .power{font-size:10px}svg .grid{stroke:var(--line)}svg polyline{fill:none;stroke-width:2.2;"
-    "stroke-linejoin:round}.run polyline{stroke:var(--run)}.run circle{fill:var(--run)}\n"
-    ".r0{--run:#7c8798}.r1{--run:#2a9d8f}.r2{--run:#3b82f6}.r3{--run:var(--mark)}"
-    ".r2 polyline{stroke-dasharray:7 5}\n"
-    ".scale{max-width:700px;margin:16px auto 0}.curve{max-width:860px}\n"
-    "dl{margin:0;max-width:52em}dt{font-weight:600;margin-top:.9em}dd{margin:0;color:var(--soft)}\n"
-    "</style></head><body><main>\n";
+#include "base/page.h"
 
 static const char words[] =
     "<h2>What the words mean</h2>\n<dl>\n"
@@ -72,7 +39,7 @@ static void put_opening(FILE *page, const demo *d) {
       "each other, blacks turn grey. counterlight measured how this room (<code>",
       page);
   const char *slash = strrchr(d->scene, '/');
-  cli_escape(page, slash ? slash + 1 : d->scene);
+  clt_page_text(page, slash ? slash + 1 : d->scene);
   fprintf(page,
           "</code>, simulated, %d&nbsp;&times;&nbsp;%d cells) carries light with %d patterns and %d camera frames, "
           "inverted that, and projected the pattern below.</p>\n",
@@ -87,9 +54,9 @@ static clt_status put_figure(FILE *page, const demo *d, const char *file, const 
     return status;
   }
   fputs("<figure><img alt=\"", page);
-  cli_escape(page, title);
+  clt_page_text(page, title);
   fputs("\" src=\"", page);
-  status = cli_embed_png(page, path, error);
+  status = clt_page_embed(page, path, "png", error);
   fprintf(page, "\"><figcaption><b>%s</b><span>%s</span></figcaption></figure>\n", title, caption);
   return status;
 }
@@ -131,9 +98,9 @@ static clt_status put_maps(FILE *page, const demo *d, clt_error *error) {
 static void put_convergence(FILE *page, const demo *d) {
   const clt_solve_result *solve = &d->result.solve;
   fputs("<h2>How the solver got there</h2>\n<p>", page);
-  cli_escape(page, solve->method);
+  clt_page_text(page, solve->method);
   fprintf(page, ", %d iterations in %.0f&nbsp;ms: ", solve->iterations, 1e3 * solve->seconds);
-  cli_escape(page, solve->reason);
+  clt_page_text(page, solve->reason);
   fputs(".</p>\n", page);
   if (d->race.count > 0) {
     fputs(
@@ -167,7 +134,7 @@ static void put_timings(FILE *page, const demo *d) {
 }
 
 static clt_status put_page(FILE *page, const demo *d, clt_error *error) {
-  fputs(head, page);
+  clt_page_begin(page, "counterlight: what the room shows");
   put_opening(page, d);
   clt_status status = put_pictures(page, d, error);
   if (!status) {
@@ -176,26 +143,16 @@ static clt_status put_page(FILE *page, const demo *d, clt_error *error) {
   put_convergence(page, d);
   put_timings(page, d);
   fputs(words, page);
-  fprintf(page,
-          "<p class=\"soft\">counterlight %s. All numbers: <code>summary.json</code>.</p>\n</main></body></html>\n",
-          CLT_VERSION);
+  fprintf(page, "<p class=\"soft\">counterlight %s. All numbers: <code>summary.json</code>.</p>\n", CLT_VERSION);
+  clt_page_end(page);
   return status;
 }
 
 clt_status cli_report_write(const char *path, const demo *d, clt_error *error) {
-  char *text = NULL;
-  size_t size = 0;
-  FILE *page = open_memstream(&text, &size);
-  if (!page) {
-    return clt_fail(error, CLT_FAILED, "%s: out of memory for the report: %s", path, strerror(errno));
-  }
-  clt_status status = put_page(page, d, error);
-  if (fclose(page) && !status) {
-    status = clt_fail(error, CLT_FAILED, "%s: out of memory for the report", path);
-  }
+  clt_text text;
+  clt_status status = clt_text_open(&text, path, error);
   if (!status) {
-    status = clt_file_write(path, text, size, error);
+    status = put_page(text.to, d, error);
   }
-  free(text);
-  return status;
+  return clt_text_close(&text, status, error);
 }

@@ -15,9 +15,4 @@ void cli_report_curves(FILE *page, const clt_solve_result *runs, int count);
 /* An inline SVG of the error maps' colour scale from 0 to top (in units of white). */
 clt_status cli_report_scale(FILE *page, double top, clt_error *error);
 
-/* Writes the file at path as a base64 data URI of an image/png. */
-clt_status cli_embed_png(FILE *page, const char *path, clt_error *error);
-/* Writes text with &, <, > and quotes escaped. */
-void cli_escape(FILE *page, const char *text);
-
 #endif

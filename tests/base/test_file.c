@@ -73,11 +73,31 @@ static void a_target_that_is_a_folder_is_kept(void **state) {
   rmdir(folder);
 }
 
+static void a_text_becomes_a_file_only_where_all_went_well(void **state) {
+  (void)state;
+  char folder[64], path[CLT_PATH_MAX];
+  clt_error error = {0};
+  clt_text text;
+  test_folder(folder);
+  assert_ok(clt_file_join(folder, "page.html", path, &error), error);
+  assert_ok(clt_text_open(&text, path, &error), error);
+  fprintf(text.to, "%s", "whole");
+  assert_int_equal(entries_in(folder), 0);
+  assert_ok(clt_text_close(&text, CLT_OK, &error), error);
+  content_is(path, "whole");
+  assert_ok(clt_text_open(&text, path, &error), error);
+  fprintf(text.to, "half");
+  assert_int_equal(clt_text_close(&text, CLT_FAILED, &error), CLT_FAILED);
+  content_is(path, "whole");
+  assert_int_equal(entries_in(folder), 1);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_file_is_replaced_whole_and_leaves_nothing_behind),
       cmocka_unit_test(what_cannot_be_written_is_said),
       cmocka_unit_test(a_target_that_is_a_folder_is_kept),
+      cmocka_unit_test(a_text_becomes_a_file_only_where_all_went_well),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
