@@ -37,7 +37,7 @@ typedef struct clt_provenance {
 typedef struct clt_transport_info {
   int width, height, channels;
   size_t rows, cols;   /* cols = width * height; rows = cols where one camera shares the projector's grid */
-  const char *storage; /* "dense", "tree" */
+  const char *storage; /* "dense", "dense64", "dense16", "dense8", "tree" */
   size_t bytes;        /* memory that one product of every channel reads */
 } clt_transport_info;
 
@@ -61,6 +61,22 @@ CLT_PUBLIC int clt_tree_levels(int width, int height);
 /* Number of the node at column bx, row by of level `level`, and the total of nodes. */
 CLT_PUBLIC int32_t clt_tree_node(int width, int height, int level, int bx, int by);
 CLT_PUBLIC int32_t clt_tree_nodes(int width, int height);
+
+/* Makes a copy in another dense storage, from any storage: entries, black, flood, deviations and provenance. Errors are
+ * relative to the largest entry off the diagonal of a row (max_i) or of 32 neighbours in it (max_b); "rms" is what they
+ * make of the compensated picture (NUMERICS section 3).
+ *   storage    bytes an entry  an entry off the diagonal                      diagonal  accumulation            rms
+ *   "dense64"  8               exact                                          exact     double                  0
+ *   "dense"    4               2^-24 of itself                                float     double                  1e-8
+ *   "dense16"  2               2^-11 of itself, at least 2^-30 max_i          float     float over 1024 terms
+ * 1e-5..3e-4 "dense8"   1.125           max_b / 254, and the row's exact sum is kept   float     float over 1024 terms
+ * 2e-4 The vectors of a product with "dense16" and "dense8" count as floats. CLT_BAD_INPUT for a storage that does not
+ * exist (the message lists those that do) and for an entry that it cannot hold (beyond float; "dense8": beyond 1e30).
+ */
+CLT_PUBLIC clt_status clt_transport_convert(const clt_transport *transport, const char *storage, clt_transport **out,
+                                            clt_error *error);
+/* The storages that clt_transport_convert makes, in order: index 0.. until NULL. */
+CLT_PUBLIC const char *clt_transport_storage_name(size_t index);
 
 /* Frees a transport; accepts NULL. */
 CLT_PUBLIC void clt_transport_destroy(clt_transport *transport);
@@ -88,7 +104,7 @@ CLT_PUBLIC const float *clt_transport_sigma(const clt_transport *transport, int 
 CLT_PUBLIC clt_status clt_transport_keep_sigma(clt_transport *transport, clt_error *error);
 CLT_PUBLIC float *clt_transport_sigma_values(clt_transport *transport, int channel);
 
-/* The entries of a dense transport's channel, rows x cols row-major, to read or fill; NULL for other storage. */
+/* The entries of a "dense" transport's channel, rows x cols row-major, to read or fill; NULL for other storage. */
 CLT_PUBLIC float *clt_transport_entries(const clt_transport *transport, int channel);
 
 /* y = T x: x has cols values, y has rows; they must not overlap. */

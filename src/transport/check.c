@@ -3,6 +3,9 @@
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
+
+#include "base/memory.h"
 
 static size_t value_count(const clt_values *values) {
   size_t count = 1;
@@ -25,10 +28,13 @@ static void format_index(const clt_values *values, size_t position, char text[80
   }
 }
 
-static clt_status refuse_value(const clt_values *values, size_t position, const char *rule, clt_error *error) {
+/* Light cannot be negative: what noise may leave, relative to the largest entry. */
+static const double NEGATIVE_MOST = 1e-2;
+static const char finite_rule[] = "every value must be a finite number: measure or write it again";
+
+static clt_status refuse(const clt_values *values, size_t position, double value, const char *rule, clt_error *error) {
   char index[80];
   format_index(values, position, index);
-  double value = values->data[position];
   if (isnan(value)) {
     return clt_fail(error, CLT_BAD_INPUT, "%s: %s[%s] is NaN; %s", values->source, values->name, index, rule);
   }
@@ -39,11 +45,25 @@ static clt_status refuse_value(const clt_values *values, size_t position, const 
   return clt_fail(error, CLT_BAD_INPUT, "%s: %s[%s] is %.4g; %s", values->source, values->name, index, value, rule);
 }
 
+static clt_status refuse_value(const clt_values *values, size_t position, const char *rule, clt_error *error) {
+  return refuse(values, position, (double)values->data[position], rule, error);
+}
+
+static clt_status refuse_negative(const clt_values *values, size_t position, double value, double largest,
+                                  clt_error *error) {
+  char rule[160];
+  snprintf(rule, sizeof rule,
+           "light cannot be negative beyond noise, -1 %% of the largest entry (%.4g): subtract the right black and "
+           "measure again",
+           largest);
+  return refuse(values, position, value, rule, error);
+}
+
 clt_status clt_check_finite(const clt_values *values, clt_error *error) {
   size_t count = value_count(values);
   for (size_t i = 0; i < count; i++) {
     if (!(fabsf(values->data[i]) <= FLT_MAX)) {
-      return refuse_value(values, i, "every value must be a finite number: measure or write it again", error);
+      return refuse_value(values, i, finite_rule, error);
     }
   }
   return CLT_OK;
@@ -63,15 +83,48 @@ clt_status clt_check_entries(const clt_values *values, clt_error *error) {
       darkest = i;
     }
   }
-  if ((double)least >= -1e-2 * (double)largest) {
-    return CLT_OK;
+  return (double)least >= -NEGATIVE_MOST * (double)largest
+             ? CLT_OK
+             : refuse_negative(values, darkest, (double)least, (double)largest, error);
+}
+
+/* The extremes of the rows seen so far. */
+typedef struct extremes {
+  double largest, least;
+  size_t darkest; /* position of the least */
+} extremes;
+
+static clt_status check_row(const clt_values *values, const double *row, size_t before, extremes *seen,
+                            clt_error *error) {
+  for (size_t j = 0; j < values->shape[2]; j++) {
+    if (!isfinite(row[j])) {
+      return refuse(values, before + j, row[j], finite_rule, error);
+    }
+    seen->largest = fmax(row[j], seen->largest);
+    if (row[j] < seen->least) {
+      seen->least = row[j];
+      seen->darkest = before + j;
+    }
   }
-  char rule[160];
-  snprintf(rule, sizeof rule,
-           "light cannot be negative beyond noise, -1 %% of the largest entry (%.4g): subtract the right black and "
-           "measure again",
-           (double)largest);
-  return refuse_value(values, darkest, rule, error);
+  return CLT_OK;
+}
+
+clt_status clt_check_rows(const clt_transport *transport, const char *source, const char *name, clt_error *error) {
+  const clt_transport_info info = clt_transport_describe(transport);
+  const clt_values values = {
+      .source = source, .name = name, .rank = 3, .shape = {(size_t)info.channels, info.rows, info.cols}};
+  extremes seen = {0};
+  double *row = clt_alloc(info.cols, sizeof *row);
+  clt_status status =
+      row != NULL ? CLT_OK : clt_fail(error, CLT_FAILED, "%s: no memory for a row of %zu cells", source, info.cols);
+  for (size_t k = 0; k < (size_t)info.channels * info.rows && status == CLT_OK; k++) {
+    status = clt_transport_row(transport, (int)(k / info.rows), k % info.rows, row, error);
+    status = status == CLT_OK ? check_row(&values, row, k * info.cols, &seen, error) : status;
+  }
+  free(row);
+  return status != CLT_OK || seen.least >= -NEGATIVE_MOST * seen.largest
+             ? status
+             : refuse_negative(&values, seen.darkest, seen.least, seen.largest, error);
 }
 
 clt_status clt_check_deviations(const clt_values *values, clt_error *error) {

@@ -17,6 +17,8 @@ typedef struct clt_values {
 clt_status clt_check_finite(const clt_values *values, clt_error *error);
 /* Entries of T: finite, and none below -1e-2 of the largest; noise may make an entry slightly negative. */
 clt_status clt_check_entries(const clt_values *values, clt_error *error);
+/* The same of a transport whose kind gives rows, for its dataset or group `name`. */
+clt_status clt_check_rows(const clt_transport *transport, const char *source, const char *name, clt_error *error);
 /* Standard deviations: not negative, not NaN; infinite where a cell was never seen. */
 clt_status clt_check_deviations(const clt_values *values, clt_error *error);
 

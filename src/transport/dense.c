@@ -1,149 +1,7 @@
-/* Dense storage: float32, channels x rows x cols, row-major. Products accumulate in double. */
-#include <omp.h>
-#include <stdlib.h>
-
-#include "base/memory.h"
+/* Dense storage in single precision. */
+#define REAL float
 #include "transport/check.h"
-#include "transport/kind.h"
-
-enum {
-  LANES = 8,            /* partial sums of a row, so that additions do not wait for each other */
-  PANEL = 64,           /* rows that a transposed product takes up at once */
-  TILE = 1024,          /* columns that it keeps in the first cache meanwhile */
-  WORTH_SHARING = 32768 /* entries from which threads pay */
-};
-
-static const float *row_of(const clt_transport *transport, int channel, size_t row) {
-  return (const float *)transport->storage + ((size_t)channel * transport->rows + row) * transport->cols;
-}
-
-/* Adds in a fixed order, whatever the compiler and the number of threads. */
-static double add_lanes(const double *sum) {
-  return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
-}
-
-static double row_product(const float *row, const double *x, size_t cols) {
-  double sum[LANES] = {0};
-  size_t j = 0;
-  for (; j + LANES <= cols; j += LANES) {
-    for (int lane = 0; lane < LANES; lane++) {
-      sum[lane] += (double)row[j + (size_t)lane] * x[j + (size_t)lane];
-    }
-  }
-  for (int lane = 0; j < cols; j++, lane++) {
-    sum[lane] += (double)row[j] * x[j];
-  }
-  return add_lanes(sum);
-}
-
-static double row_sum(const float *row, size_t cols) {
-  double sum[LANES] = {0};
-  size_t j = 0;
-  for (; j + LANES <= cols; j += LANES) {
-    for (int lane = 0; lane < LANES; lane++) {
-      sum[lane] += (double)row[j + (size_t)lane];
-    }
-  }
-  for (int lane = 0; j < cols; j++, lane++) {
-    sum[lane] += (double)row[j];
-  }
-  return add_lanes(sum);
-}
-
-static void dense_apply(const clt_transport *transport, int channel, const double *x, double *y) {
-  const size_t cols = transport->cols, rows = transport->rows;
-#pragma omp parallel for schedule(static) if (rows * cols >= WORTH_SHARING)
-  for (size_t i = 0; i < rows; i++) {
-    y[i] = row_product(row_of(transport, channel, i), x, cols);
-  }
-}
-
-static void dense_row_sums(const clt_transport *transport, int channel, double *sums) {
-  const size_t cols = transport->cols, rows = transport->rows;
-#pragma omp parallel for schedule(static) if (rows * cols >= WORTH_SHARING)
-  for (size_t i = 0; i < rows; i++) {
-    sums[i] = row_sum(row_of(transport, channel, i), cols);
-  }
-}
-
-/* The next rows, at most PANEL, whose y is not zero; returns how many and moves *next behind them. */
-static int gather_rows(const double *y, size_t rows, size_t *next, size_t picked[PANEL]) {
-  int count = 0;
-  size_t i = *next;
-  for (; i < rows && count < PANEL; i++) {
-    if (y[i] != 0) {
-      picked[count++] = i;
-    }
-  }
-  *next = i;
-  return count;
-}
-
-/* x[j] += sum over the picked rows of y_i T_ij, for `cols` columns from `first`, four rows at a time. Every column adds
- * in the same order wherever a thread's share begins. */
-static void add_rows(const clt_transport *transport, int channel, const double *y, const size_t *picked, int count,
-                     size_t first, size_t cols, double *x) {
-  int k = 0;
-  for (; k + 4 <= count; k += 4) {
-    const float *a = row_of(transport, channel, picked[k]) + first;
-    const float *b = row_of(transport, channel, picked[k + 1]) + first;
-    const float *c = row_of(transport, channel, picked[k + 2]) + first;
-    const float *d = row_of(transport, channel, picked[k + 3]) + first;
-    const double ya = y[picked[k]], yb = y[picked[k + 1]], yc = y[picked[k + 2]], yd = y[picked[k + 3]];
-    for (size_t j = 0; j < cols; j++) {
-      x[j] += (ya * (double)a[j] + yb * (double)b[j]) + (yc * (double)c[j] + yd * (double)d[j]);
-    }
-  }
-  for (; k < count; k++) {
-    const float *a = row_of(transport, channel, picked[k]) + first;
-    const double ya = y[picked[k]];
-    for (size_t j = 0; j < cols; j++) {
-      x[j] += ya * (double)a[j];
-    }
-  }
-}
-
-/* The columns first..first + cols - 1 of T'y: panels of rows stream by while a tile of x stays in the cache. */
-static void transposed_tile(const clt_transport *transport, int channel, const double *y, size_t first, size_t cols,
-                            double *x) {
-  size_t picked[PANEL], next = 0;
-  for (size_t j = 0; j < cols; j++) {
-    x[first + j] = 0;
-  }
-  for (int count; (count = gather_rows(y, transport->rows, &next, picked)) > 0;) {
-    for (size_t done = 0; done < cols; done += TILE) {
-      size_t width = cols - done < TILE ? cols - done : TILE;
-      add_rows(transport, channel, y, picked, count, first + done, width, x + first + done);
-    }
-  }
-}
-
-/* Each thread owns a range of columns, so that no partial sums need adding up. */
-static void dense_apply_transposed(const clt_transport *transport, int channel, const double *y, double *x) {
-  const size_t cols = transport->cols;
-  const size_t share = 512;
-  const size_t shares = (cols + share - 1) / share;
-#pragma omp parallel if (transport->rows * cols >= WORTH_SHARING)
-  {
-    const size_t threads = (size_t)omp_get_num_threads(), me = (size_t)omp_get_thread_num();
-    const size_t begin = shares * me / threads * share;
-    size_t end = shares * (me + 1) / threads * share;
-    end = end < cols ? end : cols;
-    if (begin < end) {
-      transposed_tile(transport, channel, y, begin, end - begin, x);
-    }
-  }
-}
-
-static void dense_diagonal(const clt_transport *transport, int channel, double *diagonal) {
-  for (size_t i = 0; i < transport->rows && i < transport->cols; i++) {
-    diagonal[i] = row_of(transport, channel, i)[i];
-  }
-}
-
-static size_t dense_bytes(const clt_transport *transport) {
-  return (size_t)transport->channels * transport->rows * transport->cols * sizeof(float);
-}
+#include "transport/dense_plain.h"
 
 static float *dense_entries(const clt_transport *transport, int channel) {
   return (float *)transport->storage + (size_t)channel * transport->rows * transport->cols;
@@ -158,32 +16,13 @@ static clt_status dense_check(const clt_transport *transport, const char *source
   return clt_check_entries(&values, error);
 }
 
-static clt_hdf_array dense_array(const clt_transport *transport) {
-  return (clt_hdf_array){.name = "/dense",
-                         .type = H5T_NATIVE_FLOAT,
-                         .rank = 3,
-                         .shape = {(size_t)transport->channels, transport->rows, transport->cols},
-                         .data = transport->storage};
-}
-
 static clt_status dense_load(clt_transport *transport, const clt_hdf *hdf, clt_error *error) {
-  clt_hdf_array array = dense_array(transport);
-  array.shape[1] = CLT_HDF_ANY;
-  clt_status status = clt_hdf_read(hdf, &array, error);
-  if (status != CLT_OK) {
-    return status;
-  }
-  transport->storage = array.data;
-  return clt_transport_set_rows(transport, array.shape[1], hdf->path, error);
+  return load_array(transport, hdf, dense_array(transport, "/dense", H5T_NATIVE_FLOAT), error);
 }
 
 static clt_status dense_save(const clt_transport *transport, const clt_hdf *hdf, clt_error *error) {
-  clt_hdf_array array = dense_array(transport);
+  clt_hdf_array array = dense_array(transport, "/dense", H5T_NATIVE_FLOAT);
   return clt_hdf_write(hdf, &array, error);
-}
-
-static void dense_destroy(clt_transport *transport) {
-  free(transport->storage);
 }
 
 const clt_kind clt_kind_dense = {.name = "dense",
@@ -193,22 +32,14 @@ const clt_kind clt_kind_dense = {.name = "dense",
                                  .row_sums = dense_row_sums,
                                  .bytes = dense_bytes,
                                  .entries = dense_entries,
+                                 .row = dense_row,
+                                 .most = FLT_MAX,
+                                 .reserve = dense_reserve,
+                                 .put_row = dense_put_row,
                                  .check = dense_check,
                                  .load = dense_load,
                                  .save = dense_save,
                                  .destroy = dense_destroy};
-
-static clt_status make_entries(clt_transport *transport, clt_error *error) {
-  /* rows and cols are at most 2^28 each, so that neither factor overflows; clt_alloc looks after the product */
-  transport->storage = clt_alloc(transport->rows * transport->cols, (size_t)transport->channels * sizeof(float));
-  if (transport->storage == NULL) {
-    return clt_fail(error, CLT_FAILED,
-                    "a dense transport of %d x %zu x %zu entries needs %.1f GiB, more than there is: use a smaller "
-                    "grid or tree storage",
-                    transport->channels, transport->rows, transport->cols, (double)dense_bytes(transport) / 0x1p30);
-  }
-  return CLT_OK;
-}
 
 clt_status clt_transport_create_dense(int width, int height, int channels, size_t rows, clt_transport **out,
                                       clt_error *error) {
@@ -219,7 +50,7 @@ clt_status clt_transport_create_dense(int width, int height, int channels, size_
   clt_transport *transport = *out;
   status = clt_transport_set_rows(transport, rows, "a dense transport", error);
   if (status == CLT_OK) {
-    status = make_entries(transport, error);
+    status = dense_reserve(transport, error);
   }
   if (status == CLT_OK) {
     status = clt_transport_keep_black(transport, error);

@@ -156,6 +156,14 @@ bool clt_hdf_has_values(const clt_hdf *hdf, const char *name) {
   return !empty;
 }
 
+hid_t clt_hdf_half(void) {
+  hid_t half = H5Tcopy(H5T_NATIVE_FLOAT);
+  H5Tset_fields(half, 15, 10, 5, 0, 10);
+  H5Tset_size(half, 2);
+  H5Tset_ebias(half, 15);
+  return half;
+}
+
 clt_status clt_hdf_make_group(const clt_hdf *hdf, const char *name, clt_error *error) {
   hid_t group = H5Gcreate2(hdf->file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   if (group < 0) {

@@ -49,6 +49,9 @@ clt_status clt_hdf_refuse_write(const clt_hdf *hdf, const char *name, clt_error 
 /* Fails where values of the type cannot be converted to numbers. */
 clt_status clt_hdf_require_numbers(const clt_hdf *hdf, const char *name, hid_t type, clt_error *error);
 
+/* The type of IEEE half-precision numbers in this machine's byte order; the caller closes it. */
+hid_t clt_hdf_half(void);
+
 #define CLT_HDF_ANY SIZE_MAX
 
 /* A dataset on its way between file and memory, C order. */

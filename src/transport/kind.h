@@ -2,6 +2,8 @@
 #ifndef CLT_TRANSPORT_KIND_H
 #define CLT_TRANSPORT_KIND_H
 
+#include <float.h>
+
 #include "counterlight/transport.h"
 #include "transport/hdf.h"
 
@@ -17,6 +19,14 @@ typedef struct clt_kind {
   void (*row_sums)(const clt_transport *transport, int channel, double *sums);
   size_t (*bytes)(const clt_transport *transport);
   float *(*entries)(const clt_transport *transport, int channel); /* NULL where T is not held entry by entry */
+  /* values_j = T_ij; NULL where a row is had by a transposed product. */
+  void (*row)(const clt_transport *transport, int channel, size_t row, double *values);
+  /* A transport that is made row by row (clt_transport_convert): the largest magnitude of an entry that it can hold,
+   * room for the entries of one that knows its grid, channels and rows, and a row of them. 0 and NULL where a kind is
+   * not made that way. Several threads may put rows at once. */
+  double most;
+  clt_status (*reserve)(clt_transport *transport, clt_error *error);
+  void (*put_row)(clt_transport *transport, int channel, size_t row, const double *values);
   /* Whether every entry is one that a file may hold; the message begins with `source`. */
   clt_status (*check)(const clt_transport *transport, const char *source, clt_error *error);
   /* Reads its part of a file into a transport that knows its grid and channels but neither rows nor storage. What it
@@ -26,7 +36,9 @@ typedef struct clt_kind {
   void (*destroy)(clt_transport *transport); /* frees the storage, also a half-built one and none */
 } clt_kind;
 
-extern const clt_kind clt_kind_dense, clt_kind_tree;
+enum { CLT_WORTH_SHARING = 32768 }; /* dense entries from which threads pay */
+
+extern const clt_kind clt_kind_dense, clt_kind_dense64, clt_kind_dense16, clt_kind_dense8, clt_kind_tree;
 
 /* Every kind, ended by NULL. */
 extern const clt_kind *const clt_kinds[];
@@ -46,6 +58,8 @@ clt_status clt_transport_begin(const clt_kind *kind, int width, int height, int 
                                clt_transport **out, clt_error *error);
 /* Gives it its rows, 1..CLT_GRID_SIDE_MAX^2. */
 clt_status clt_transport_set_rows(clt_transport *transport, size_t rows, const char *source, clt_error *error);
+/* Fails as a dense transport of so many bytes finds no memory. */
+clt_status clt_transport_too_large(const clt_transport *transport, size_t bytes, clt_error *error);
 /* Makes room for the black, which every transport has; zeros. */
 clt_status clt_transport_keep_black(clt_transport *transport, clt_error *error);
 

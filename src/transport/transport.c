@@ -3,7 +3,8 @@
 #include "base/memory.h"
 #include "transport/kind.h"
 
-const clt_kind *const clt_kinds[] = {&clt_kind_dense, &clt_kind_tree, NULL};
+const clt_kind *const clt_kinds[] = {&clt_kind_dense,  &clt_kind_dense64, &clt_kind_dense16,
+                                     &clt_kind_dense8, &clt_kind_tree,    NULL};
 
 clt_status clt_transport_begin(const clt_kind *kind, int width, int height, int channels, const char *source,
                                clt_transport **out, clt_error *error) {
@@ -36,6 +37,13 @@ clt_status clt_transport_set_rows(clt_transport *transport, size_t rows, const c
   }
   transport->rows = rows;
   return CLT_OK;
+}
+
+clt_status clt_transport_too_large(const clt_transport *transport, size_t bytes, clt_error *error) {
+  return clt_fail(error, CLT_FAILED,
+                  "a dense transport of %d x %zu x %zu entries needs %.1f GiB, more than there is: use a smaller grid "
+                  "or tree storage",
+                  transport->channels, transport->rows, transport->cols, (double)bytes / 0x1p30);
 }
 
 void clt_transport_destroy(clt_transport *transport) {
@@ -132,11 +140,8 @@ void clt_transport_apply_all(const clt_transport *transport, const double *x, do
 }
 
 clt_status clt_transport_row(const clt_transport *transport, int channel, size_t i, double *row, clt_error *error) {
-  const float *entries = clt_transport_entries(transport, channel);
-  if (entries != NULL) {
-    for (size_t j = 0; j < transport->cols; j++) {
-      row[j] = (double)entries[i * transport->cols + j];
-    }
+  if (transport->kind->row != NULL) {
+    transport->kind->row(transport, channel, i, row);
     return CLT_OK;
   }
   double *unit = clt_alloc(transport->rows, sizeof *unit);

@@ -1,5 +1,5 @@
 /* Loads a transport and prints what it is as JSON, or the error; for test_h5py.py. Exit: 0 loaded, 1 CLT_FAILED,
- * 2 CLT_BAD_INPUT. With a second argument it also saves it there. */
+ * 2 CLT_BAD_INPUT. With a second argument it also saves it there, with a third one converted to that storage. */
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
@@ -63,6 +63,12 @@ int main(int count, char **arguments) {
   clt_transport *transport = NULL;
   clt_status status =
       count < 2 ? clt_fail(&error, CLT_BAD_INPUT, "give a file") : clt_transport_load(arguments[1], &transport, &error);
+  if (status == CLT_OK && count > 3) {
+    clt_transport *converted = NULL;
+    status = clt_transport_convert(transport, arguments[3], &converted, &error);
+    clt_transport_destroy(transport);
+    transport = converted;
+  }
   if (status == CLT_OK && count > 2) {
     status = clt_transport_save(transport, arguments[2], &error);
   }

@@ -5,7 +5,7 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
-#include "cases.h"
+#include "storages.h"
 
 enum { DAMAGES = 200 };
 
@@ -133,7 +133,24 @@ static void test_tree(void **unused) {
   damage(random_tree, 2);
 }
 
+static void test_dense64(void **unused) {
+  (void)unused;
+  damage(contact_dense64, 3);
+}
+
+static void test_dense16(void **unused) {
+  (void)unused;
+  damage(contact_dense16, 4);
+}
+
+static void test_dense8(void **unused) {
+  (void)unused;
+  damage(contact_dense8, 5);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_dense), cmocka_unit_test(test_tree)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_dense), cmocka_unit_test(test_tree),
+                                     cmocka_unit_test(test_dense64), cmocka_unit_test(test_dense16),
+                                     cmocka_unit_test(test_dense8)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

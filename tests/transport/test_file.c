@@ -4,7 +4,7 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
-#include "cases.h"
+#include "storages.h"
 
 static void fill_all(clt_transport *transport, uint64_t *state) {
   clt_error error;
@@ -84,6 +84,15 @@ static void test_round_trips(void **unused) {
   for (size_t k = 0; k + 1 < SIZE_CASES; k++) {
     round_trip(random_dense, &size_cases[k], k);
     round_trip(random_tree, &size_cases[k], k);
+  }
+}
+
+static void test_storages(void **unused) {
+  (void)unused;
+  for (size_t k = 0; k + 1 < SIZE_CASES; k++) {
+    round_trip(contact_dense64, &size_cases[k], k);
+    round_trip(contact_dense16, &size_cases[k], k);
+    round_trip(contact_dense8, &size_cases[k], k);
   }
 }
 
@@ -210,8 +219,8 @@ static void test_no_place(void **unused) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_round_trips), cmocka_unit_test(test_plain),
-                                     cmocka_unit_test(test_bad_values), cmocka_unit_test(test_full_disk),
-                                     cmocka_unit_test(test_no_place)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_round_trips), cmocka_unit_test(test_storages),
+                                     cmocka_unit_test(test_plain),       cmocka_unit_test(test_bad_values),
+                                     cmocka_unit_test(test_full_disk),   cmocka_unit_test(test_no_place)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

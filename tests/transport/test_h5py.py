@@ -221,6 +221,149 @@ class Accepted(Case):
             np.testing.assert_array_equal(answer['flood'], file['flood'][:])
 
 
+def contact(rows, seed=5):
+    """Entries that range over 1e5 along a row, a bright diagonal and noise below zero."""
+    random = np.random.default_rng(seed)
+    away = np.abs(np.arange(rows)[:, None] - np.arange(N)[None, :])
+    light = np.where(away == 0, 0.7, 0.2 * random.random((C, rows, N)) * 10.0 ** (-5 * np.minimum(away / 10, 1)))
+    return (light + 1e-5 * (random.random((C, rows, N)) - 0.5)).astype('f4')
+
+
+class Storages(Case):
+    """docs/transport-file.md read by numpy against what the conversion was given, and written by numpy."""
+
+    def convert(self, dense, storage):
+        write(self.path, dense)
+        copy = os.path.join(self.folder, storage + '.h5')
+        code, answer = show(self.path, copy, storage)
+        self.assertEqual((code, answer['storage']), (0, storage))
+        self.assertEqual(show(copy), (code, answer))
+        return h5py.File(copy), answer
+
+    def compare(self, entries, answer, tolerance):
+        """The products are those of the entries."""
+        rows = entries.shape[1]
+        for c in range(C):
+            size = np.abs(entries[c]).max() * 400
+            np.testing.assert_allclose(answer['forward'][c], entries[c] @ (1.0 + np.arange(N)), atol=tolerance * size)
+            np.testing.assert_allclose(answer['backward'][c], (1.0 + np.arange(rows)) @ entries[c], atol=tolerance * size)
+
+    def off_diagonal(self, dense):
+        rest = dense.astype(float)
+        for i in range(min(rest.shape[1:])):
+            rest[:, i, i] = 0
+        return rest
+
+    @staticmethod
+    def set_diagonal(entries, diagonal):
+        for i in range(diagonal.shape[1]):
+            entries[:, i, i] = diagonal[:, i]
+        return entries
+
+    def test_dense64(self):
+        for rows in (N, 23, 9):
+            dense = contact(rows)
+            file, answer = self.convert(dense, 'dense64')
+            with file:
+                self.assertEqual(file['dense64'].dtype, np.dtype('f8'))
+                np.testing.assert_array_equal(file['dense64'][:], dense.astype(float))
+            self.compare(dense.astype(float), answer, 1e-15)
+
+    def test_dense16(self):
+        for rows in (N, 23, 9):
+            dense = contact(rows)
+            file, answer = self.convert(dense, 'dense16')
+            with file:
+                value, scale, diagonal = (file['dense16'][k][:] for k in ('value', 'scale', 'diagonal'))
+            self.assertEqual((value.dtype, scale.shape), (np.dtype('f2'), (C, rows)))
+            rest = self.off_diagonal(dense)
+            np.testing.assert_array_equal(scale, 2.0 ** (np.frexp(np.abs(rest).max(2))[1] - 15))
+            wanted = (rest / scale[..., None]).astype('f2')
+            normal = np.abs(wanted) >= 2.0 ** -14
+            np.testing.assert_array_equal(value[normal], wanted[normal])
+            self.assertTrue((np.abs(value[value != 0]) >= 2.0 ** -14).all())  # nothing is subnormal
+            np.testing.assert_array_equal(diagonal, [np.diagonal(d) for d in dense])
+            self.compare(self.set_diagonal(value.astype(float) * scale[..., None], diagonal), answer, 1e-7)
+
+    def test_dense8(self):
+        for rows in (N, 23, 9):
+            dense = contact(rows)
+            file, answer = self.convert(dense, 'dense8')
+            with file:
+                code, scale, offset, diagonal = (file['dense8'][k][:] for k in ('code', 'scale', 'offset', 'diagonal'))
+            self.assertEqual((code.dtype, scale.shape, offset.shape), (np.dtype('i1'), (C, rows, 1), (C, rows)))
+            rest = self.off_diagonal(dense)
+            largest = np.abs(rest).max(2, keepdims=True)
+            np.testing.assert_allclose(scale, largest / 127, rtol=1e-6)
+            np.testing.assert_array_equal(code, np.rint(rest / scale))
+            entries = code * scale.astype(float) + offset[..., None]
+            np.testing.assert_allclose(self.off_diagonal(entries).sum(2), rest.sum(2), atol=1e-7 * largest.max())
+            np.testing.assert_array_equal(diagonal, [np.diagonal(d) for d in dense])
+            self.compare(self.set_diagonal(entries, diagonal), answer, 1e-7)
+
+    def write_parts(self, **parts):
+        write(self.path, entries())
+        with h5py.File(self.path, 'a') as file:
+            del file['dense']
+            for name, value in parts.items():
+                file[name.replace('_', '/')] = value
+
+    def test_written_by_h5py(self):
+        """Other number types are converted; a row may be all zero."""
+        value = self.off_diagonal(contact(N)).astype('f4')
+        value[0, 3] = 0
+        ones = np.ones((C, N))
+        self.write_parts(dense16_value=value, dense16_scale=2 * ones, dense16_diagonal=ones.astype('i4'))
+        code, answer = show(self.path)
+        self.assertEqual((code, answer['storage']), (0, 'dense16'))
+        self.compare(self.set_diagonal(2 * value.astype('f2').astype(float), ones), answer, 1e-7)
+        codes = np.random.default_rng(8).integers(0, 100, (C, N, N))
+        codes[:, range(N), range(N)] = 0
+        self.write_parts(dense8_code=codes, dense8_scale=np.full((C, N, 1), 0.01), dense8_offset=0.1 * ones,
+                         dense8_diagonal=ones)
+        code, answer = show(self.path)
+        self.assertEqual((code, answer['storage']), (0, 'dense8'))
+        self.compare(self.set_diagonal(0.01 * codes + 0.1, ones), answer, 1e-7)
+
+    def test_refused(self):
+        ones, zeros = np.ones((C, N)), np.zeros((C, N, N), 'i1')
+        halves = dict(dense16_value=zeros.astype('f2'), dense16_scale=ones, dense16_diagonal=ones)
+        codes = dict(dense8_code=zeros, dense8_scale=np.ones((C, N, 1)), dense8_offset=0 * ones, dense8_diagonal=ones)
+
+        def at(array, index, value):
+            changed = np.array(array, 'f8')
+            changed[index] = value
+            return changed
+
+        for good, change, word in (
+                (halves, dict(dense16_value=at(zeros, (1, 2, 2), 1)), '/dense16/value[1, 2, 2]'),
+                (halves, dict(dense16_value=at(zeros, (1, 2, 3), np.nan).astype('f2')), '/dense16[1, 2, 3]'),
+                (halves, dict(dense16_value=at(zeros, (1, 2, 3), np.inf).astype('f2')), '/dense16[1, 2, 3]'),
+                (halves, dict(dense16_value=at(zeros, (1, 2, 3), 1e6)), '/dense16[1, 2, 3]'),
+                (halves, dict(dense16_value=at(zeros, (1, 2, 3), -0.02).astype('f2')), '/dense16[1, 2, 3]'),
+                (halves, dict(dense16_scale=at(ones, (0, 4), np.inf)), '/dense16[0, 4,'),
+                (halves, dict(dense16_diagonal=at(ones, (0, 4), np.nan)), '/dense16[0, 4, 4]'),
+                (halves, dict(dense16_scale=ones[:, 1:]), '/dense16/scale'),
+                (halves, dict(dense16_diagonal=ones[0]), '/dense16/diagonal'),
+                (halves, dict(dense16_value=zeros[:, :, 1:]), '/dense16/value'),
+                (codes, dict(dense8_code=at(zeros, (1, 2, 2), 1)), '/dense8/code[1, 2, 2]'),
+                (codes, dict(dense8_scale=np.ones((C, N, 2))), '/dense8/scale'),
+                (codes, dict(dense8_scale=at(np.ones((C, N, 1)), (1, 3, 0), np.nan)), '/dense8[1, 3, 0]'),
+                (codes, dict(dense8_offset=at(0 * ones, (1, 3), -1)), '/dense8[1, 3, 0]'),
+                (codes, dict(dense8_diagonal=at(ones, (1, 3), np.inf)), '/dense8[1, 3, 3]')):
+            with self.subTest(word=word, part=list(change)[0]):
+                self.write_parts(**{**good, **change})
+                self.refused(word)
+        for good in (halves, codes):
+            for name in good:
+                with self.subTest(missing=name):
+                    self.write_parts(**{k: v for k, v in good.items() if k != name})
+                    self.refused('/' + name.replace('_', '/'))
+        for value, word in ((np.nan, 'NaN'), (np.inf, 'infinite'), (-0.02, '-0.02')):
+            self.write_parts(dense64=at(at(zeros, (0, 0, 0), 1), (1, 2, 3), value))
+            self.refused('/dense64[1, 2, 3]', word)
+
+
 class Refused(Case):
     def test_attributes(self):
         cases = [

@@ -1,0 +1,46 @@
+/* The inner loops over codes of 16 and 8 bits: portable C, and instructions that this processor may have.
+ *
+ * Every variant of a kernel multiplies, adds and orders its sums alike (no fused operations), so that the bits of a
+ * product do not depend on the processor. */
+#ifndef CLT_TRANSPORT_KERNELS_H
+#define CLT_TRANSPORT_KERNELS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum { CLT_LANES = 32, CLT_BLOCK = 32 /* int8 codes under one scale */ };
+
+/* IEEE half-precision codes, all of them finite. */
+typedef struct clt_half_kernels {
+  const char *needs; /* what the processor must have; NULL: nothing */
+  bool (*runs_here)(void);
+  /* sum over k < count of code_k x_k in CLT_LANES partial sums */
+  double (*dot)(const uint16_t *code, const float *x, size_t count);
+  /* x_k += (y_0 code_0k + y_1 code_1k) + (y_2 code_2k + y_3 code_3k) */
+  void (*add)(const uint16_t *const code[4], const float y[4], size_t count, float *x);
+} clt_half_kernels;
+
+/* int8 codes in blocks of CLT_BLOCK with a scale each; the last block may be short. */
+typedef struct clt_byte_kernels {
+  const char *needs;
+  bool (*runs_here)(void);
+  /* sum over k < count of scale_b code_k x_k, b = k / CLT_BLOCK */
+  double (*dot)(const int8_t *code, const float *scale, const float *x, size_t count);
+  /* x_k += (s_0 code_0k + s_1 code_1k) + (s_2 code_2k + s_3 code_3k), s_r = y_r scale_rb */
+  void (*add)(const int8_t *const code[4], const float *const scale[4], const float y[4], size_t count, float *x);
+} clt_byte_kernels;
+
+/* Every variant, the fastest first, ended by the portable one and NULL. */
+extern const clt_half_kernels *const clt_half_variants[];
+extern const clt_byte_kernels *const clt_byte_variants[];
+/* The first that runs here. */
+const clt_half_kernels *clt_half_choose(void);
+const clt_byte_kernels *clt_byte_choose(void);
+
+/* A code's value, and the code nearest to a value of magnitude up to 65504 (ties to even). No code is subnormal: what
+ * is below the least normal magnitude, 2^-14, becomes 0 or that. */
+float clt_half_value(uint16_t code);
+uint16_t clt_half_code(float value);
+
+#endif
