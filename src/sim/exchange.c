@@ -4,26 +4,59 @@
 
 #include "base/memory.h"
 #include "sim/formfactor.h"
+#include "sim/sides.h"
 
 /* What may pass between a pair of surfaces. */
 enum sight { HIDDEN, OPEN, PERHAPS_PARTED };
 
-/* Looking for what could part each pair takes surfaces^3 steps; so many surfaces do part some, and rays tell. */
-enum { CULLED_MAX = 256 };
+typedef struct sights {
+  clt_sides *surfaces, *elements;
+  unsigned char *pairs; /* of surfaces: what may pass between them */
+} sights;
 
-static void find_sights(const clt_parts *parts, unsigned char *sights) {
+static void finish_sights(sights *seen) {
+  clt_sides_destroy(seen->surfaces);
+  clt_sides_destroy(seen->elements);
+  free(seen->pairs);
+}
+
+static enum sight surfaces_sight(const sights *seen, int a, int b) {
+  if (a == b || !clt_sides_in_front(seen->surfaces, a, b) || !clt_sides_in_front(seen->surfaces, b, a)) {
+    return HIDDEN;
+  }
+  return clt_sides_may_be_parted(seen->surfaces, a, b, a, b) ? PERHAPS_PARTED : OPEN;
+}
+
+static clt_status find_sights(const clt_parts *parts, sights *seen, clt_error *error) {
   int count = parts->surface_count;
-#pragma omp parallel for schedule(dynamic)
+  seen->pairs = clt_alloc((size_t)count * (size_t)count, 1);
+  if (seen->pairs == NULL) {
+    return clt_fail(error, CLT_FAILED, "out of memory for what stands between %d surfaces", count);
+  }
+  clt_status status = clt_sides_create(parts->surfaces, count, parts->surfaces, count, &seen->surfaces, error);
+  if (status == CLT_OK) {
+    status = clt_sides_create(parts->surfaces, count, parts->elements, parts->count, &seen->elements, error);
+  }
+  if (status != CLT_OK) {
+    return status;
+  }
+#pragma omp parallel for schedule(dynamic, 16)
   for (int a = 0; a < count; a++) {
     for (int b = 0; b < count; b++) {
-      enum sight found = HIDDEN;
-      if (a != b && clt_rectangles_face(&parts->surfaces[a], &parts->surfaces[b])) {
-        bool parted = count > CULLED_MAX || clt_rectangles_may_be_parted(parts->surfaces, count, a, b);
-        found = parted ? PERHAPS_PARTED : OPEN;
-      }
-      sights[(size_t)a * (size_t)count + (size_t)b] = (unsigned char)found;
+      seen->pairs[(size_t)a * (size_t)count + (size_t)b] = (unsigned char)surfaces_sight(seen, a, b);
     }
   }
+  return CLT_OK;
+}
+
+/* Parts of surfaces are in sight of each other where the surfaces are, and often where those are not wholly so. */
+static enum sight elements_sight(const clt_parts *parts, const sights *seen, int i, int j) {
+  int a = parts->surface[i], b = parts->surface[j];
+  enum sight found = (enum sight)seen->pairs[(size_t)a * (size_t)parts->surface_count + (size_t)b];
+  if (found == HIDDEN || !clt_sides_in_front(seen->elements, i, b) || !clt_sides_in_front(seen->elements, j, a)) {
+    return HIDDEN;
+  }
+  return found == PERHAPS_PARTED && !clt_sides_may_be_parted(seen->elements, i, j, a, b) ? OPEN : found;
 }
 
 static double fraction(double x) {
@@ -33,31 +66,30 @@ static double fraction(double x) {
 /* The fraction of segments from a to b that nothing cuts, between points of a set that covers both evenly (Roberts' R4
  * sequence), begun elsewhere for every pair so that the pairs' errors do not add up. */
 static double visible_fraction(const clt_parts *parts, int i, int j) {
-  enum { SEGMENTS = 16 };
   const double step[4] = {0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101};
   const clt_rectangle *a = &parts->elements[i], *b = &parts->elements[j];
   double begin = fraction(0.7548776662466927 * i + 0.5698402909980532 * j);
-  int open = 0;
-  for (int k = 0; k < SEGMENTS; k++) {
+  clt_vector from[CLT_SEGMENTS], to[CLT_SEGMENTS];
+  for (int k = 0; k < CLT_SEGMENTS; k++) {
     double at[4];
     for (int d = 0; d < 4; d++) {
       at[d] = fraction((d + 1) * begin + k * step[d]);
     }
-    clt_vector from = clt_rectangle_point(a, at[0], at[1]);
-    clt_vector to = clt_rectangle_point(b, at[2], at[3]);
-    open += !clt_visibility_blocked(parts->visibility, from, to, parts->surface[i], parts->surface[j]);
+    from[k] = clt_rectangle_point(a, at[0], at[1]);
+    to[k] = clt_rectangle_point(b, at[2], at[3]);
   }
-  return open / (double)SEGMENTS;
+  int open = clt_visibility_open(parts->visibility, from, to, parts->surface[i], parts->surface[j]);
+  return open / (double)CLT_SEGMENTS;
 }
 
-static void fill(const clt_parts *parts, const unsigned char *sights, double *exchange) {
+static void fill(const clt_parts *parts, const sights *seen, double *exchange) {
 #pragma omp parallel for schedule(dynamic, 16)
   for (int j = parts->count - 1; j >= 0; j--) {
     double *column = &exchange[(size_t)j * (size_t)parts->count];
     for (int i = 0; i < j; i++) {
       const clt_rectangle *a = &parts->elements[i], *b = &parts->elements[j];
-      size_t pair = (size_t)parts->surface[i] * (size_t)parts->surface_count + (size_t)parts->surface[j];
-      double visible = sights[pair] == HIDDEN ? 0.0 : sights[pair] == OPEN ? 1.0 : visible_fraction(parts, i, j);
+      enum sight sight = elements_sight(parts, seen, i, j);
+      double visible = sight == HIDDEN ? 0.0 : sight == OPEN ? 1.0 : visible_fraction(parts, i, j);
       column[i] = visible > 0.0 ? visible * clt_formfactor_exchange(a, b) : 0.0;
     }
   }
@@ -161,18 +193,17 @@ static void balance(const clt_parts *parts, double *exchange, double *scale, dou
 }
 
 clt_status clt_exchange_compute(const clt_parts *parts, double *exchange, clt_error *error) {
-  size_t count = (size_t)parts->count, surfaces = (size_t)parts->surface_count;
-  unsigned char *sights = clt_alloc(surfaces * surfaces, 1);
+  size_t count = (size_t)parts->count;
   double *sums = clt_alloc(2 * count, sizeof *sums);
-  clt_status status = CLT_OK;
-  if (!sights || !sums) {
-    status = clt_fail(error, CLT_FAILED, "out of memory for the exchange of light between %zu elements", count);
-  } else {
-    find_sights(parts, sights);
-    fill(parts, sights, exchange);
+  sights seen = {NULL, NULL, NULL};
+  clt_status status =
+      sums != NULL ? find_sights(parts, &seen, error)
+                   : clt_fail(error, CLT_FAILED, "out of memory for the exchange of light between %zu elements", count);
+  if (status == CLT_OK) {
+    fill(parts, &seen, exchange);
     balance(parts, exchange, sums, sums + count);
   }
-  free(sights);
+  finish_sights(&seen);
   free(sums);
   return status;
 }

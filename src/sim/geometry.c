@@ -86,8 +86,7 @@ bool clt_segment_blocked(const clt_rectangle *rectangles, int count, clt_vector 
   return false;
 }
 
-/* Bit 0: a corner of `of` lies in front of the plane of `plane`; bit 1: one lies behind it. */
-static int sides(const clt_rectangle *plane, const clt_rectangle *of) {
+int clt_rectangle_sides(const clt_rectangle *plane, const clt_rectangle *of) {
   double reach = vec_length(of->u) + vec_length(of->v) + vec_length(vec_sub(of->corner, plane->corner));
   int found = 0;
   for (int k = 0; k < clt_rectangle_vertices(of); k++) {
@@ -99,7 +98,9 @@ static int sides(const clt_rectangle *plane, const clt_rectangle *of) {
 
 bool clt_rectangles_may_be_parted(const clt_rectangle *rectangles, int count, int a, int b) {
   for (int k = 0; k < count; k++) {
-    if (k != a && k != b && (sides(&rectangles[k], &rectangles[a]) | sides(&rectangles[k], &rectangles[b])) == 3) {
+    if (k != a && k != b &&
+        (clt_rectangle_sides(&rectangles[k], &rectangles[a]) | clt_rectangle_sides(&rectangles[k], &rectangles[b])) ==
+            3) {
       return true;
     }
   }
@@ -107,7 +108,7 @@ bool clt_rectangles_may_be_parted(const clt_rectangle *rectangles, int count, in
 }
 
 bool clt_rectangles_face(const clt_rectangle *a, const clt_rectangle *b) {
-  return (sides(a, b) & 1) != 0 && (sides(b, a) & 1) != 0;
+  return (clt_rectangle_sides(a, b) & 1) != 0 && (clt_rectangle_sides(b, a) & 1) != 0;
 }
 
 bool clt_pinhole_aim(clt_pinhole *pinhole, clt_vector target, clt_vector up) {

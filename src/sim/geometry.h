@@ -73,8 +73,11 @@ clt_hit clt_first_hit(const clt_rectangle *rectangles, int count, clt_vector ori
 /* True where one of the rectangles but those numbered a and b cuts the open segment between two points. */
 bool clt_segment_blocked(const clt_rectangle *rectangles, int count, clt_vector from, clt_vector to, int a, int b);
 
+/* Bit 0: a corner of `of` lies well in front of the plane of `plane`; bit 1: one lies well behind it. */
+int clt_rectangle_sides(const clt_rectangle *plane, const clt_rectangle *of);
+
 /* True where some rectangle could stand between points of rectangles a and b: one whose plane has corners of a or b
- * well on both sides. */
+ * well on both sides. For many pairs sim/sides.h tells the same sooner. */
 bool clt_rectangles_may_be_parted(const clt_rectangle *rectangles, int count, int a, int b);
 
 /* True where some point in front of a sees some point in front of b. */

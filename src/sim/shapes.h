@@ -26,4 +26,18 @@ typedef struct clt_cylinder {
 bool clt_shape_cylinder(clt_scene_description *description, const clt_cylinder *cylinder, clt_facing facing,
                         const double *albedo);
 
+/* The part of a sphere between two angles from its axis, and as far around it as a cylinder's arc. */
+typedef struct clt_sphere {
+  clt_vector centre;
+  double radius;
+  clt_vector axis, start; /* directions, perpendicular: of the pole, and to where the arc begins */
+  double from, to;        /* radians from the pole, 0 <= from < to <= pi; both poles take two rings */
+  double arc;             /* radians, counter-clockwise seen against the axis; 2 pi is all around */
+  int rings, pieces;      /* along the way from the pole, and along the arc */
+} clt_sphere;
+
+/* rings x pieces flat facets whose corners lie on the sphere, each of two triangles, or of one at a pole. */
+bool clt_shape_sphere(clt_scene_description *description, const clt_sphere *sphere, clt_facing facing,
+                      const double *albedo);
+
 #endif

@@ -4,6 +4,7 @@
 #include "sim/mesh_file.h"
 #include "sim/scene_file.h"
 #include "sim/shapes.h"
+#include "sim/visibility.h"
 
 /* Entries of the lists of a scene file. */
 enum { MATERIALS_MAX = 64, ENTRIES_MAX = 64, PIECES_MAX = 360 };
@@ -113,6 +114,53 @@ static bool read_cylinder(clt_section item, const double *albedo, clt_scene_desc
   return clt_shape_cylinder(description, &cylinder, read_facing(item), albedo);
 }
 
+static bool all_have_area(const clt_scene_description *description, int first) {
+  for (int k = first; k < description->surface_count; k++) {
+    clt_rectangle surface = description->surfaces[k];
+    if (!clt_rectangle_complete(&surface)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/* Facets are as wide as 15 degrees where the file does not say otherwise. */
+static void read_sphere_angles(clt_section item, clt_sphere *sphere) {
+  double from = clt_read_number(item, "from", 0.0, 0.0, 180.0), to = clt_read_number(item, "to", 180.0, 0.0, 180.0);
+  double arc = clt_read_number(item, "arc", 360.0, 1.0, 360.0);
+  int fewest_rings = from <= 0.0 && to >= 180.0 ? 2 : 1, fewest_pieces = arc > 180.0 ? 3 : 1;
+  if (!(to - from >= 1.0)) {
+    clt_section_fail(item, "to", "is %g; it must be at least 1 degree above from, which is %g", to, from);
+  }
+  sphere->from = from * M_PI / 180.0;
+  sphere->to = to * M_PI / 180.0;
+  sphere->arc = arc * M_PI / 180.0;
+  sphere->rings =
+      clt_read_integer(item, "rings", (int)fmax(fewest_rings, (to - from) / 15.0), fewest_rings, PIECES_MAX);
+  sphere->pieces = clt_read_integer(item, "pieces", (int)fmax(fewest_pieces, arc / 15.0), fewest_pieces, PIECES_MAX);
+}
+
+static bool read_sphere(clt_section item, const double *albedo, clt_scene_description *description) {
+  clt_sphere sphere = {.centre = read_needed(item, "sphere", "centre", (clt_vector){0.0, 0.0, 0.0}),
+                       .axis = clt_scene_read_vector(item, "axis", (clt_vector){0.0, 0.0, 1.0}),
+                       .start = clt_scene_read_vector(item, "start", (clt_vector){1.0, 0.0, 0.0}),
+                       .radius = clt_read_number(item, "radius", 1.0, 1e-3, 1e3)};
+  int first = description->surface_count;
+  read_sphere_angles(item, &sphere);
+  if (!clt_section_has(item, "radius")) {
+    clt_section_fail(item, NULL, "a sphere needs radius = ...");
+  }
+  if (too_short(sphere.axis) || too_short(sphere.start) || !perpendicular(sphere.axis, sphere.start)) {
+    clt_section_fail(item, "axis", "axis and start must be longer than 1e-6 and perpendicular to each other");
+    return true;
+  }
+  bool fitted = clt_shape_sphere(description, &sphere, read_facing(item), albedo);
+  if (!all_have_area(description, first)) {
+    clt_section_fail(item, "pieces", "makes facets without area; take fewer pieces or rings");
+  }
+  return fitted;
+}
+
 /* What is wrong with the file is kept here. */
 static bool read_mesh(clt_section item, const double *albedo, clt_scene_description *description) {
   char folder[CLT_PATH_MAX], path[CLT_PATH_MAX];
@@ -136,7 +184,11 @@ static bool read_mesh(clt_section item, const double *albedo, clt_scene_descript
 static const struct type {
   const char *name;
   bool (*read)(clt_section item, const double *albedo, clt_scene_description *description);
-} types[] = {{"rectangle", read_rectangle}, {"box", read_box}, {"cylinder", read_cylinder}, {"mesh", read_mesh}};
+} types[] = {{"rectangle", read_rectangle},
+             {"box", read_box},
+             {"cylinder", read_cylinder},
+             {"sphere", read_sphere},
+             {"mesh", read_mesh}};
 enum { TYPES = sizeof types / sizeof types[0] };
 
 static void read_surface(clt_section item, const material *materials, int count, clt_scene_description *description) {
@@ -182,6 +234,22 @@ static bool inside_solid(const clt_scene_description *description, clt_vector pl
   return true;
 }
 
+/* backs: whether it meets a back before that. */
+static bool lights_a_front(const clt_scene_description *description, const clt_visibility *visibility, bool *backs) {
+  for (int cell = 0; cell < description->width * description->height; cell++) {
+    for (int ray = 0; ray < description->rays * description->rays; ray++) {
+      double solid_angle;
+      clt_vector direction = clt_scene_ray(description, cell, ray, &solid_angle);
+      clt_hit hit = clt_visibility_first_hit(visibility, description->projector.pinhole.position, direction, -1);
+      if (hit.surface >= 0 && hit.front) {
+        return true;
+      }
+      *backs = *backs || hit.surface >= 0;
+    }
+  }
+  return false;
+}
+
 void clt_scene_check_lit(clt_section root, const clt_scene_description *description) {
   if (inside_solid(description, description->projector.pinhole.position)) {
     clt_section_fail(root, "projector",
@@ -189,22 +257,20 @@ void clt_scene_check_lit(clt_section root, const clt_scene_description *descript
                      "object facing = \"in\"");
     return;
   }
-  bool backs = false;
-  for (int cell = 0; cell < description->width * description->height; cell++) {
-    for (int ray = 0; ray < description->rays * description->rays; ray++) {
-      double solid_angle;
-      clt_vector direction = clt_scene_ray(description, cell, ray, &solid_angle);
-      clt_hit hit = clt_first_hit(description->surfaces, description->surface_count,
-                                  description->projector.pinhole.position, direction, -1);
-      if (hit.surface >= 0 && hit.front) {
-        return;
-      }
-      backs = backs || hit.surface >= 0;
-    }
+  clt_visibility *visibility = NULL;
+  clt_error error = {.status = CLT_OK};
+  if (clt_visibility_create(description->surfaces, description->surface_count, &visibility, &error) != CLT_OK) {
+    clt_section_fail(root, "surfaces", "%s", error.message);
+    return;
   }
-  clt_section_fail(root, "projector",
-                   backs ? "lights only backs of surfaces; they reflect on the side of u x v: swap their u and v"
-                         : "its light meets no surface; check position, target and tangent");
+  bool backs = false;
+  if (!lights_a_front(description, visibility, &backs)) {
+    clt_section_fail(root, "projector",
+                     backs ? "lights only backs of surfaces; they reflect on the side of u x v: swap their u and v, or "
+                             "give an object the other facing"
+                           : "its light meets no surface; check position, target and tangent");
+  }
+  clt_visibility_destroy(visibility);
 }
 
 clt_vector clt_scene_ray(const clt_scene_description *description, int cell, int ray, double *solid_angle) {

@@ -22,10 +22,13 @@ typedef struct passing {
 } passing;
 
 static void let_pass(const struct RTCFilterFunctionNArguments *asked) {
+  enum { SURFACE = 5 }; /* which of a hit's fields, N values each, is its primID */
   const passing *through = (const passing *)(const void *)asked->context;
-  unsigned met = ((const struct RTCHit *)(const void *)asked->hit)->primID; /* single rays: N = 1 */
-  if (met == through->a || met == through->b) {
-    asked->valid[0] = 0;
+  const unsigned *met = (const unsigned *)(const void *)asked->hit + SURFACE * asked->N;
+  for (unsigned k = 0; k < asked->N; k++) {
+    if (met[k] == through->a || met[k] == through->b) {
+      asked->valid[k] = 0;
+    }
   }
 }
 
@@ -127,14 +130,52 @@ clt_hit clt_visibility_first_hit(const clt_visibility *visibility, clt_vector or
   return hit;
 }
 
+/* Single precision: a surface that touches an end of a segment within this part of it is not between. */
+static const double TOUCHING = 1e-6;
+
 bool clt_visibility_blocked(const clt_visibility *visibility, clt_vector from, clt_vector to, int a, int b) {
   if (visibility->scene == NULL) {
     return clt_segment_blocked(visibility->surfaces, visibility->count, from, to, a, b);
   }
-  /* single precision: a surface that touches an end within this part of the segment is not between */
-  const double touching = 1e-6;
-  struct RTCRay ray = ray_along(from, vec_sub(to, from), touching, 1.0 - touching);
+  struct RTCRay ray = ray_along(from, vec_sub(to, from), TOUCHING, 1.0 - TOUCHING);
   passing through = pass_through(a, b);
   rtcOccluded1(visibility->scene, &through.context, &ray);
   return ray.tfar < 0.0f;
+}
+
+static void set_segment(struct RTCRay16 *rays, int k, clt_vector from, clt_vector to) {
+  struct RTCRay ray = ray_along(from, vec_sub(to, from), TOUCHING, 1.0 - TOUCHING);
+  rays->org_x[k] = ray.org_x;
+  rays->org_y[k] = ray.org_y;
+  rays->org_z[k] = ray.org_z;
+  rays->dir_x[k] = ray.dir_x;
+  rays->dir_y[k] = ray.dir_y;
+  rays->dir_z[k] = ray.dir_z;
+  rays->tnear[k] = ray.tnear;
+  rays->tfar[k] = ray.tfar;
+  rays->mask[k] = ray.mask;
+}
+
+int clt_visibility_open(const clt_visibility *visibility, const clt_vector from[CLT_SEGMENTS],
+                        const clt_vector to[CLT_SEGMENTS], int a, int b) {
+  int open = 0;
+  if (visibility->scene == NULL) {
+    for (int k = 0; k < CLT_SEGMENTS; k++) {
+      open += !clt_segment_blocked(visibility->surfaces, visibility->count, from[k], to[k], a, b);
+    }
+    return open;
+  }
+  RTC_ALIGN(64) int valid[CLT_SEGMENTS];
+  struct RTCRay16 rays = {.time = {0.0f}};
+  for (int k = 0; k < CLT_SEGMENTS; k++) {
+    valid[k] = -1;
+    set_segment(&rays, k, from[k], to[k]);
+  }
+  passing through = pass_through(a, b);
+  through.context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcOccluded16(valid, visibility->scene, &through.context, &rays);
+  for (int k = 0; k < CLT_SEGMENTS; k++) {
+    open += !(rays.tfar[k] < 0.0f);
+  }
+  return open;
 }

@@ -90,6 +90,8 @@ static void what_does_not_fit_is_left_out(void **state) {
 #define BOX "corner = [-1, -1, -1]; u = [2, 0, 0]; v = [0, 2, 0]; w = [0, 0, 2]; material = \"m\";"
 #define PIPE "type = \"cylinder\"; centre = [0, 0, 0]; start = [1, 0, 0]; material = \"m\"; "
 
+#define BALL "type = \"sphere\"; centre = [0, 0, 0]; material = \"m\"; "
+
 /* A mistake is refused with its line and what to change. */
 static void mistakes_are_refused(void **state) {
   (void)state;
@@ -114,6 +116,23 @@ static void mistakes_are_refused(void **state) {
       {START "surfaces = ( { type = \"cylinder\"; centre = [0.0, 0.0, 0.0]; start = [0.001, 0.0, 0.0]; "
              "material = \"m\"; axis = [0, 0, 1]; arc = 1.0; pieces = 360; } );",
        "scene.cfg:3: start", "less than 1e-6 wide"},
+      {START "surfaces = ( { " BALL "} );", "scene.cfg:3:", "a sphere needs radius"},
+      {START "surfaces = ( { type = \"sphere\"; radius = 1; material = \"m\"; } );",
+       "scene.cfg:3:", "a sphere needs centre"},
+      {START "surfaces = ( { " BALL "radius = 0; } );", "scene.cfg:3: radius", "0.001 to 1000"},
+      {START "surfaces = ( { " BALL "radius = 1; from = 200.0; } );", "scene.cfg:3: from", "0 to 180"},
+      {START "surfaces = ( { " BALL "radius = 1; from = 90.0; to = 80.0; } );", "scene.cfg:3: to",
+       "at least 1 degree above from"},
+      {START "surfaces = ( { " BALL "radius = 1; axis = [1, 0, 1]; } );", "scene.cfg:3: axis", "perpendicular"},
+      {START "surfaces = ( { " BALL "radius = 1; rings = 1; } );", "scene.cfg:3: rings", "2 to 360"},
+      {START "surfaces = ( { " BALL "radius = 1; pieces = 2; } );", "scene.cfg:3: pieces", "3 to 360"},
+      {START "surfaces = ( { " BALL "radius = 1; facing = \"up\"; } );", "scene.cfg:3: facing", "\"out\", \"in\""},
+      {START "surfaces = ( { " BALL "radius = 1; rings = 40; pieces = 60; } );", "scene.cfg:3:", "does not fit"},
+      {START "surfaces = ( { " BALL "radius = 0.001; from = 1.0; arc = 1.0; rings = 1; pieces = 360; } );",
+       "scene.cfg:3: pieces", "without area"},
+      {"grid = { width = 4; height = 3; };\nprojector = { position = [0.2, 0.1, 0.3]; target = [0.0, 1.0, 0.0]; };\n"
+       "materials = ( { name = \"m\"; } ); surfaces = ( { " BALL "radius = 1; } );",
+       "scene.cfg:2: projector", "inside an object"},
       {"grid = { width = 4; height = 3; };\nprojector = { position = [0.2, 0.1, 0.3]; target = [0.0, 1.0, 0.0]; };\n"
        "materials = ( { name = \"m\"; } ); surfaces = ( { type = \"box\"; " BOX " } );",
        "scene.cfg:2: projector", "inside an object"},

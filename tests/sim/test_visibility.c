@@ -76,10 +76,40 @@ static void ends_do_not_block(void **state) {
   clt_visibility_destroy(NULL);
 }
 
+/* Segments that are traced together are blocked as those that are traced alone, by Embree and without. */
+static void segments_together(void **state) {
+  (void)state;
+  uint64_t random = 9;
+  clt_rectangle plates[SURFACES];
+  strew(plates, &random);
+  for (int count = 6; count <= SURFACES; count += SURFACES - 6) {
+    clt_error error = {.status = CLT_OK};
+    clt_visibility *visibility = NULL;
+    assert_ok(clt_visibility_create(plates, count, &visibility, &error), error);
+    int open = 0, differ = 0, pairs = 0;
+    for (int n = 0; n < 1000; n++, pairs++) {
+      int a = n % count, b = (n / count + a + 1) % count, alone = 0;
+      clt_vector from[CLT_SEGMENTS], to[CLT_SEGMENTS];
+      for (int k = 0; k < CLT_SEGMENTS; k++) {
+        from[k] = clt_rectangle_point(&plates[a], test_random(&random), test_random(&random));
+        to[k] = clt_rectangle_point(&plates[b], test_random(&random), test_random(&random));
+        alone += !clt_visibility_blocked(visibility, from[k], to[k], a, b);
+      }
+      int together = clt_visibility_open(visibility, from, to, a, b);
+      differ += abs(together - alone);
+      open += together;
+    }
+    clt_visibility_destroy(visibility);
+    assert_true(open > pairs && open < CLT_SEGMENTS * pairs);
+    assert_true(differ <= 2);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(rays_agree_with_the_definition),
       cmocka_unit_test(ends_do_not_block),
+      cmocka_unit_test(segments_together),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,6 +2,7 @@
  * light between two others. Computed with the scene's light; here is told where. */
 #include <stdio.h>
 
+#include "sim/sides.h"
 #include "sim/state.h"
 
 static const char nothing[] = "nothing stands between the projector, the camera and the surfaces";
@@ -31,15 +32,21 @@ static int hiding_cells(const clt_scene_description *description) {
   return count;
 }
 
-/* Pairs of surfaces that face each other with another one perhaps between. */
+/* Pairs of surfaces that face each other with another one perhaps between; -1 where memory is short. */
 static int blocked_pairs(const clt_scene_description *description) {
   int pairs = 0, count = description->surface_count;
+  clt_error error = {.status = CLT_OK};
+  clt_sides *sides = NULL;
+  if (clt_sides_create(description->surfaces, count, description->surfaces, count, &sides, &error) != CLT_OK) {
+    return -1;
+  }
   for (int a = 0; a < count; a++) {
     for (int b = 0; b < a; b++) {
-      pairs += clt_rectangles_face(&description->surfaces[a], &description->surfaces[b]) &&
-               clt_rectangles_may_be_parted(description->surfaces, count, a, b);
+      bool face = clt_sides_in_front(sides, a, b) && clt_sides_in_front(sides, b, a);
+      pairs += face && clt_sides_may_be_parted(sides, a, b, a, b);
     }
   }
+  clt_sides_destroy(sides);
   return pairs;
 }
 
@@ -54,9 +61,13 @@ static bool called_for(const clt_scene *scene, char *why) {
     snprintf(why, CLT_EFFECT_WHY_MAX, "%s", nothing);
     return false;
   }
-  snprintf(why, CLT_EFFECT_WHY_MAX,
-           "in %d cells a surface hides another; between %d pairs of facing surfaces others may stand", hiding,
-           blocked);
+  int length = snprintf(why, CLT_EFFECT_WHY_MAX, "in %d cells a surface hides another; ", hiding);
+  if (blocked < 0) {
+    snprintf(why + length, CLT_EFFECT_WHY_MAX - (size_t)length, "memory is too short to tell where else");
+  } else {
+    snprintf(why + length, CLT_EFFECT_WHY_MAX - (size_t)length, "between %d pairs of facing surfaces others may stand",
+             blocked);
+  }
   return true;
 }
 
