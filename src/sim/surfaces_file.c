@@ -172,6 +172,8 @@ static bool read_mesh(clt_section item, const double *albedo, clt_scene_descript
     clt_section_fail(item, NULL, "a mesh needs file = \"...\"");
     return true;
   }
+  static const char *const ups[] = {"z", "y", NULL};
+  place.y_up = clt_read_choice(item, "up", clt_mesh_file_is_y_up(name), ups) == 1;
   clt_error wrong = {.status = CLT_OK};
   clt_file_folder(description->path, folder);
   if (clt_file_join(folder, name, path, &wrong) != CLT_OK ||

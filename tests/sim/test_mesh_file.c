@@ -28,7 +28,7 @@ static clt_status add_text(clt_scene_description *scene, const char *text, const
 static clt_scene_description *read_cube(clt_facing facing) {
   clt_scene_description *scene = calloc(1, sizeof *scene);
   clt_error error = {.status = CLT_OK};
-  clt_mesh_place place = {{1, 2, 3}, 0.5};
+  clt_mesh_place place = {{1, 2, 3}, 0.5, false};
   clt_status status = add_text(scene, CUBE, &place, facing, &error);
   if (status == CLT_FAILED) { /* a build without meshes */
     clt_scene_description_finish(scene);
@@ -137,7 +137,7 @@ static void divided_triangles_light_alike(void **state) {
   describe_view(&triangles, 6, 4, (clt_vector){0, -3, 0}, (clt_vector){0, 0, 0});
   add_surface(&walls, (clt_vector){-2, -2, -2}, (clt_vector){2, 2, 0}, (clt_vector){0, 0, 4}, 0.5);
   add_surface(&walls, (clt_vector){0, 0, -2}, (clt_vector){2, -2, 0}, (clt_vector){0, 0, 4}, 0.5);
-  clt_mesh_place place = {{0, 0, 0}, 1.0};
+  clt_mesh_place place = {{0, 0, 0}, 1.0, false};
   clt_error error = {.status = CLT_OK};
   clt_status status =
       add_text(&triangles, "v -2 -2 -2\nv 0 0 -2\nv 0 0 2\nv -2 -2 2\nv 2 -2 -2\nv 2 -2 2\nf 1 2 3 4\nf 2 5 6 3\n",
@@ -173,7 +173,7 @@ static void mistakes_are_refused(void **state) {
   };
   clt_scene_description *scene = read_cube(CLT_FACING_OUT); /* skips where meshes are not read */
   scene->surface_count = 0;
-  clt_mesh_place place = {{0, 0, 0}, 1.0};
+  clt_mesh_place place = {{0, 0, 0}, 1.0, false};
   for (size_t k = 0; k < sizeof refusals / sizeof refusals[0]; k++) {
     clt_error error = {.status = CLT_OK};
     clt_status status = add_text(scene, refusals[k][0], &place, CLT_FACING_OUT, &error);

@@ -38,6 +38,7 @@ static void measure(const clt_sphere *sphere, clt_facing facing, double *area, d
     *area += size;
     *volume += size * vec_dot(vec_sub(clt_rectangle_centre(facet), sphere->centre), facet->normal) / 3.0;
   }
+  clt_scene_description_finish(scene);
   free(scene);
 }
 
@@ -58,6 +59,7 @@ static void facets_lie_on_the_sphere(void **state) {
       assert_true(way == 0 ? outward > 0.9 : outward < -0.9);
       assert_near(facet->albedo[1], grey[1], 0.0);
     }
+    clt_scene_description_finish(scene);
     free(scene);
   }
 }
@@ -110,6 +112,7 @@ static void sections_are_where_they_should_be(void **state) {
   scene->surface_count = 7;
   assert_false(clt_shape_sphere(scene, &many, CLT_FACING_OUT, grey));
   assert_int_equal(scene->surface_count, 7);
+  clt_scene_description_finish(scene);
   free(scene);
 }
 
@@ -133,6 +136,7 @@ static double worst_of_facets(int rings) {
       }
     }
   }
+  clt_scene_description_finish(scene);
   free(scene);
   return worst;
 }
@@ -195,6 +199,7 @@ static void form_factors_of_halves(void **state) {
       off[n] = fmax(off[n], fabs(exchanged(scene, exchange, halves[k / 4], halves[k % 4]) - 0.5));
     }
     free(exchange);
+    clt_scene_description_finish(scene);
     free(scene);
   }
   print_message("form factors between halves: off by at most %.3g, %.3g\n", off[0], off[1]);
@@ -230,6 +235,7 @@ static void furnace(void **state) {
   free(system);
   free(radiance);
   free(exchange);
+  clt_scene_description_finish(scene);
   free(scene);
 }
 
@@ -250,14 +256,14 @@ static double integrate(int rings, double albedo, double *worst) {
   clt_error error = {.status = CLT_OK};
   assert_ok(clt_light_init(&light, scene, &error), error);
   assert_ok(clt_light_solve(&light, 0, &error), error);
-  double *scratch = calloc((size_t)light.mesh.lit, sizeof *scratch), row[32], sum = 0.0, pairs = 0.0;
+  double *scratch = calloc((size_t)light.layout.mesh.used, sizeof *scratch), row[32], sum = 0.0, pairs = 0.0;
   double wanted = albedo * albedo / (4 * M_PI * M_PI * RADIUS * RADIUS * (1 - albedo));
   *worst = 0.0;
   for (int i = 0; i < 32; i++) {
     clt_light_row(&light, 0, i, row, scratch);
     for (int j = 0; j < 32; j++) {
       if (abs(i % 8 - j % 8) >= 3) {
-        double off = row[j] / (10.0 * light.mesh.solid_angle[j]) / wanted - 1.0;
+        double off = row[j] / (10.0 * light.layout.cells.solid_angle[j]) / wanted - 1.0;
         *worst = fmax(*worst, fabs(off));
         sum += off;
         pairs += 1.0;
@@ -266,6 +272,7 @@ static double integrate(int rings, double albedo, double *worst) {
   }
   free(scratch);
   clt_light_finish(&light);
+  clt_scene_description_finish(scene);
   free(scene);
   return sum / pairs;
 }
