@@ -3,11 +3,10 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "base/file.h"
 #include "cli/command.h"
+#include "cli/folder.h"
 #include "cli/measure.h"
 #include "cli/solve_options.h"
 
@@ -27,50 +26,21 @@ static const char notes[] =
     "Photographs are divided by white and sRGB-encoded, the uncompensated one after its best single brightness\n"
     "factor. pattern.png holds panel values. error_limit is the bounded optimum on the scene's exact transport.\n";
 
-/* The source tree first: there a newly built program finds its own scene. */
-static const char *const default_scenes[] = {CLT_SOURCE_SCENES "/dihedral.cfg", CLT_INSTALLED_SCENES "/dihedral.cfg"};
-
 static clt_status choose_scene(const char *given, demo *d, clt_error *error) {
-  const char *scene = given;
-  for (size_t i = 0; !scene && i < sizeof default_scenes / sizeof *default_scenes; i++) {
-    if (access(default_scenes[i], R_OK) == 0) {
-      scene = default_scenes[i];
-    }
+  const char *scenes = NULL;
+  d->scene = given;
+  clt_status status = given ? CLT_OK : cli_scenes_folder(&scenes, error);
+  if (!status && !given) {
+    status = clt_file_join(scenes, "dihedral.cfg", d->own_scene, error);
+    d->scene = d->own_scene;
   }
-  if (!scene) {
-    return clt_fail(error, CLT_FAILED, "the scene %s is not there; name one with --scene", default_scenes[1]);
-  }
-  d->scene = scene;
-  return clt_station_for_scene(scene, &d->config, error);
-}
-
-/* The folder need not be there, but it must be possible to make it or to write into it. */
-static clt_status choose_folder(const char *given, demo *d, clt_error *error) {
-  const char *name = given ? given : "demo-out";
-  size_t length = strlen(name);
-  while (length > 1 && name[length - 1] == '/') {
-    length--;
-  }
-  if (length == 0 || length >= sizeof d->folder) {
-    return clt_fail(error, CLT_BAD_INPUT, "--output: the name of the folder is %s", length ? "too long" : "empty");
-  }
-  memcpy(d->folder, name, length);
-  char probe[CLT_PATH_MAX];
-  struct stat there;
-  if (stat(d->folder, &there)) {
-    return cli_output_check(d->folder, error);
-  }
-  if (!S_ISDIR(there.st_mode)) {
-    return clt_fail(error, CLT_BAD_INPUT, "%s: is there and is no folder; name another with --output", d->folder);
-  }
-  clt_status status = clt_file_join(d->folder, "report.html", probe, error);
-  return status ? status : cli_output_check(probe, error);
+  return status ? status : clt_station_for_scene(d->scene, &d->config, error);
 }
 
 static clt_status read_options(const cli_command *command, const cli_arguments *arguments, demo *d, clt_error *error) {
   clt_solve_options unused;
   d->target_path = cli_value(command, arguments, "target");
-  clt_status status = choose_folder(cli_value(command, arguments, "output"), d, error);
+  clt_status status = cli_folder_choose(cli_value(command, arguments, "output"), "demo-out", d->folder, error);
   if (!status) {
     status = cli_solve_options(command, arguments, &unused, &d->white, error);
   }

@@ -33,9 +33,10 @@ typedef struct demo_sight {
 } demo_sight;
 
 typedef struct demo {
-  char folder[CLT_PATH_MAX]; /* of the results, without a slash at its end */
-  const char *scene;         /* its file */
-  const char *target_path;   /* NULL: the picture that is drawn */
+  char folder[CLT_PATH_MAX];    /* of the results, without a slash at its end */
+  const char *scene;            /* its file */
+  char own_scene[CLT_PATH_MAX]; /* where none is given */
+  const char *target_path;      /* NULL: the picture that is drawn */
   clt_white white;
   clt_station_config config;
   clt_station station;

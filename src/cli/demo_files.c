@@ -1,12 +1,11 @@
 /* What the demo leaves: pictures, the transport, the summary and the report. */
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "base/file.h"
 #include "cli/answer.h"
 #include "cli/demo.h"
+#include "cli/folder.h"
 #include "cli/report.h"
 
 static json_t *timings_json(const demo *d) {
@@ -109,10 +108,7 @@ static const struct {
 };
 
 clt_status demo_write(const demo *d, clt_error *error) {
-  if (mkdir(d->folder, 0777) && errno != EEXIST) {
-    return clt_fail(error, CLT_FAILED, "%s: the folder cannot be made: %s", d->folder, strerror(errno));
-  }
-  clt_status status = CLT_OK;
+  clt_status status = cli_folder_make(d->folder, error);
   for (size_t i = 0; !status && i < sizeof results / sizeof *results; i++) {
     char path[CLT_PATH_MAX];
     status = clt_file_join(d->folder, results[i].name, path, error);

@@ -4,7 +4,7 @@ import sys
 import unittest
 
 PROGRAM = sys.argv[1]
-COMMANDS = ("demo acquire compensate relight inspect simulate scene status show watch reacquire snapshot hold resume "
+COMMANDS = ("demo acquire compensate relight inspect reproduce simulate scene status show watch reacquire snapshot hold resume "
             "reload").split()
 
 
