@@ -9,7 +9,7 @@
 #include "base/places.h"
 #include "base/settings.h"
 
-enum { METHOD_NAMES_MOST = 16 };
+enum { METHOD_NAMES_MOST = 48 };
 
 /* The path at key, resolved against the folder of the configuration; out stays as it is where the key is absent. */
 static void read_path(clt_section section, const char *key, const char *folder, char *out) {

@@ -106,6 +106,7 @@ clt_status clt_solver_create(const clt_transport *transport, const clt_certifica
     bool together = solver->options.together && !solver->method->apart;
     solver->systems = together ? 1 : solver->info.channels;
     status = clt_system_init(&solver->system, transport, together, error);
+    solver->system.tolerance = solver->options.tolerance;
   }
   if (status == CLT_OK) {
     measure_noise(solver);

@@ -26,7 +26,8 @@ typedef struct clt_system {
   const double *flux;         /* w, cols values; NULL while the certificate is being made */
   const unsigned char *lit;   /* cols values */
   double reciprocity;
-  void *prepared; /* what the method that runs keeps of this system between solves; NULL where it keeps nothing */
+  double tolerance; /* relative residual that solves will ask for: what a method prepares for */
+  void *prepared;   /* what the method that runs keeps of this system between solves; NULL where it keeps nothing */
 
   double *scale;        /* 1 / F at lit cells, 0 at dark ones; cols values */
   double *drive, *seen; /* operands of the products with T; cols and rows values */

@@ -288,9 +288,9 @@ static void storage_does_not_matter(void **state) {
   for (size_t m = 0; clt_method_name(m) != NULL; m++) {
     clt_solve_options options = {.method = m == 0 ? "auto" : clt_method_name(m), .tolerance = 1e-7};
     clt_solve_result result;
-    assert_ok(clt_solve(dense.transport, dense.certificate, wanted, &options, x, &result, &error), error);
-    assert_ok(clt_solve(tree.transport, tree.certificate, wanted, &options, y, &result, &error), error);
-    assert_true(room_distance(y, x, n) < 1e-4);
+    clt_status status = clt_solve(dense.transport, dense.certificate, wanted, &options, x, &result, &error);
+    assert_int_equal(clt_solve(tree.transport, tree.certificate, wanted, &options, y, &result, &error), status);
+    assert_true(status == CLT_OK ? room_distance(y, x, n) < 1e-4 : strstr(error.message, "rho(R)") != NULL);
   }
   free(start);
   free(node);

@@ -316,13 +316,22 @@ static void bad_input_is_refused(void **state) {
 
 static void methods_are_listed(void **state) {
   (void)state;
-  const char *names[] = {"jacobi", "pcg", "gmres", "bounded"};
-  for (size_t i = 0; i < 4; i++) {
-    assert_string_equal(clt_method_name(i), names[i]);
-    assert_true(strlen(clt_method_summary(i)) > 20);
+  const char *names[] = {"jacobi", "pcg", "gmres", "bounded", "direct", "stored-inverse", "matrix", "clusters"};
+  size_t count = 0;
+  for (; clt_method_name(count) != NULL; count++) {
+    assert_true(strlen(clt_method_summary(count)) > 20);
+    for (size_t i = 0; i < count; i++) {
+      assert_string_not_equal(clt_method_name(i), clt_method_name(count));
+    }
   }
-  assert_null(clt_method_name(4));
-  assert_null(clt_method_summary(4));
+  for (size_t k = 0; k < sizeof names / sizeof names[0]; k++) {
+    size_t i = 0;
+    while (i < count && strcmp(clt_method_name(i), names[k]) != 0) {
+      i++;
+    }
+    assert_true(i < count);
+  }
+  assert_null(clt_method_summary(count));
 }
 
 int main(void) {
