@@ -63,9 +63,9 @@ static double fraction(double x) {
   return x - floor(x);
 }
 
-/* The fraction of segments from a to b that nothing cuts, between points of a set that covers both evenly (Roberts' R4
- * sequence), begun elsewhere for every pair so that the pairs' errors do not add up. */
-static double visible_fraction(const clt_parts *parts, int i, int j) {
+/* Segments end at points of a set that covers both evenly (Roberts' R4 sequence), begun elsewhere for every pair so
+ * that the pairs' errors do not add up. */
+double clt_exchange_visible(const clt_parts *parts, int i, int j) {
   const double step[4] = {0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101};
   const clt_rectangle *a = &parts->elements[i], *b = &parts->elements[j];
   double begin = fraction(0.7548776662466927 * i + 0.5698402909980532 * j);
@@ -89,7 +89,7 @@ static void fill(const clt_parts *parts, const sights *seen, double *exchange) {
     for (int i = 0; i < j; i++) {
       const clt_rectangle *a = &parts->elements[i], *b = &parts->elements[j];
       enum sight sight = elements_sight(parts, seen, i, j);
-      double visible = sight == HIDDEN ? 0.0 : sight == OPEN ? 1.0 : visible_fraction(parts, i, j);
+      double visible = sight == HIDDEN ? 0.0 : sight == OPEN ? 1.0 : clt_exchange_visible(parts, i, j);
       column[i] = visible > 0.0 ? visible * clt_formfactor_exchange(a, b) : 0.0;
     }
   }
@@ -107,22 +107,22 @@ static clt_vector hemisphere(const clt_rectangle *of, int number, int count, dou
   return vec_along(across, radius * sin(angle), vec_cross(of->normal, vec_unit(of->u)), 0.0, of->u);
 }
 
-/* True where rays from the middle of every element meet fronts only. Asks one ray of each element before the next, so
- * that an open room is known at once. */
-static bool room_is_closed(const clt_parts *parts) {
-  enum { RAYS = 64 };
+/* Asks one ray of each element before the next, so that an open room is known at once. */
+bool clt_exchange_closed(const clt_parts *parts) {
+  enum { RAYS = 64, ASKED_MAX = 8192 };
   const double golden = 0.6180339887498949;
-  for (int ray = 0; ray < RAYS; ray++) {
-    for (int k = 0; k < parts->count; k++) {
+  const int stride = 1 + (parts->count - 1) / ASKED_MAX;
+  bool closed = true;
+  for (int ray = 0; ray < RAYS && closed; ray++) {
+#pragma omp parallel for schedule(static) reduction(&& : closed)
+    for (int k = 0; k < parts->count; k += stride) {
       const clt_rectangle *element = &parts->elements[k];
       clt_vector direction = hemisphere(element, ray, RAYS, golden * k);
       clt_vector from = clt_rectangle_centre(element);
-      if (!clt_visibility_first_hit(parts->visibility, from, direction, parts->surface[k]).front) {
-        return false;
-      }
+      closed = closed && clt_visibility_first_hit(parts->visibility, from, direction, parts->surface[k]).front;
     }
   }
-  return true;
+  return closed;
 }
 
 /* sums_i = scale_i (H scale)_i: the row sums of X H X. */
@@ -178,7 +178,7 @@ static void balance(const clt_parts *parts, double *exchange, double *scale, dou
     scale[i] = 1.0;
   }
   scaled_sums(exchange, parts->count, scale, sums);
-  if (room_is_closed(parts)) {
+  if (clt_exchange_closed(parts)) {
     conserve(parts, exchange, sums, scale);
   } else {
     limit(parts, sums, scale);

@@ -22,6 +22,12 @@ typedef struct clt_parts {
  * 1e-12. */
 clt_status clt_exchange_compute(const clt_parts *parts, double *exchange, clt_error *error);
 
+/* The fraction of CLT_SEGMENTS segments between elements i and j that nothing cuts. */
+double clt_exchange_visible(const clt_parts *parts, int i, int j);
+/* True where the room is closed: 64 rays from the middle of each element (of more than 8192 elements, of as many of
+ * them) meet fronts only. */
+bool clt_exchange_closed(const clt_parts *parts);
+
 /* H_ij of any two elements. */
 double clt_exchange_between(const double *exchange, int count, int i, int j);
 
