@@ -2,21 +2,16 @@
 
 #include <math.h>
 
+#include "base/random.h"
+
 static const double EXACT_BELOW = 30.0; /* electrons */
 
-static uint64_t scramble(uint64_t z) {
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return z ^ (z >> 31);
-}
-
 uint64_t clt_noise_key(uint64_t seed, uint64_t frame) {
-  return scramble(scramble(seed + 0x9e3779b97f4a7c15u) + frame);
+  return clt_random_key(seed, frame);
 }
 
 double clt_noise_uniform(uint64_t key, uint64_t counter) {
-  uint64_t bits = scramble(key + (counter + 1) * 0x9e3779b97f4a7c15u);
-  return ((double)(bits >> 12) + 0.5) * 0x1p-52;
+  return clt_random_uniform(key, counter);
 }
 
 double clt_noise_normal(double p) {

@@ -56,7 +56,8 @@ typedef struct clt_method {
 
 extern const clt_method clt_method_jacobi, clt_method_pcg, clt_method_gmres, clt_method_bounded;
 /* those that need the entries of T */
-extern const clt_method clt_method_direct, clt_method_stored_inverse, clt_method_matrix, clt_method_clusters;
+extern const clt_method clt_method_direct, clt_method_stored_inverse, clt_method_matrix, clt_method_clusters,
+    clt_method_wavelet, clt_method_montecarlo, clt_method_hybrid;
 
 /* Every method, ended by NULL (table.c). */
 extern const clt_method *const clt_methods[];
