@@ -8,7 +8,13 @@
 #include "counterlight/transport.h"
 #include "sim/geometry.h"
 
-enum { CLT_SURFACES_MAX = 2000, CLT_RECTANGLE_CELLS_MAX = 6400, CLT_EXPOSURE_DELAY_MAX = 8, CLT_SIM_CHANNELS_MAX = 3 };
+enum {
+  CLT_SURFACES_MAX = 2000,
+  CLT_RECTANGLE_CELLS_MAX = 6400,
+  CLT_EXPOSURE_DELAY_MAX = 8,
+  CLT_SIM_CHANNELS_MAX = 3,
+  CLT_MATERIALS_MAX = 64
+};
 
 typedef struct clt_projector_description {
   clt_pinhole pinhole;
@@ -20,7 +26,9 @@ typedef struct clt_projector_description {
 } clt_projector_description;
 
 typedef struct clt_camera_description {
-  int cell_pixels; /* a cell is cell_pixels x cell_pixels camera pixels */
+  bool placed;         /* it has a pose of its own; else it stands at the projector and sees all that is lit */
+  clt_pinhole pinhole; /* of a placed camera */
+  int cell_pixels;     /* a cell is cell_pixels x cell_pixels camera pixels */
   int bits;
   clt_curve response;
   double responsivity;          /* fraction of full well per radiance and second; 0: chosen to suit the scene */
@@ -59,6 +67,14 @@ typedef struct clt_change_description {
   double factor[CLT_SIM_CHANNELS_MAX];
 } clt_change_description;
 
+/* Light that a surface throws towards the mirror direction, on top of the diffuse light: of irradiance from one
+ * direction, strength (exponent + 2) / (2 pi) cos^exponent(angle from the mirror direction) per steradian (Phong 1975,
+ * made to conserve energy: Lafortune and Willems 1994). At most the fraction `strength` of the light comes back so. */
+typedef struct clt_gloss {
+  double strength[CLT_SIM_CHANNELS_MAX]; /* 0: no gloss */
+  double exponent;
+} clt_gloss;
+
 /* Strengths of the effects that have keys of their own; zero strength is an effect left out. */
 typedef struct clt_effects_description {
   /* light of channel c = sum over k of crosstalk[c][k] drive of channel k */
@@ -84,7 +100,8 @@ typedef struct clt_scene_description {
   double ambient[CLT_SIM_CHANNELS_MAX]; /* radiance added to every cell */
   uint64_t seed;
   clt_effects_description effects;
-  clt_rectangle *surfaces; /* owned here, with room for surface_room of them */
+  clt_gloss gloss[CLT_MATERIALS_MAX]; /* of each material */
+  clt_rectangle *surfaces;            /* owned here, with room for surface_room of them */
   int surface_count, surface_room;
   clt_transport *transport; /* of a transport_file, owned here; NULL where there are surfaces */
 } clt_scene_description;
@@ -97,6 +114,11 @@ void clt_scene_description_finish(clt_scene_description *description);
 /* Makes room for `more` surfaces behind those that are there; false where a scene would have more than
  * CLT_SURFACES_MAX, or memory is short. */
 bool clt_scene_reserve_surfaces(clt_scene_description *description, int more);
+
+/* Where the camera is. */
+clt_vector clt_scene_eye(const clt_scene_description *description);
+/* True where a surface's material has gloss in some channel. */
+bool clt_scene_is_glossy(const clt_scene_description *description, int surface);
 
 /* Ambient radiance of the brightest channel. */
 double clt_ambient_most(const clt_scene_description *description);

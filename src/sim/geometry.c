@@ -126,3 +126,10 @@ bool clt_pinhole_aim(clt_pinhole *pinhole, clt_vector target, clt_vector up) {
 clt_vector clt_pinhole_direction(const clt_pinhole *pinhole, double x, double y) {
   return vec_along(pinhole->forward, x * pinhole->tangent[0], pinhole->right, y * pinhole->tangent[1], pinhole->up);
 }
+
+bool clt_pinhole_covers(const clt_pinhole *pinhole, clt_vector at) {
+  clt_vector view = vec_sub(at, pinhole->position);
+  double depth = vec_dot(view, pinhole->forward);
+  return depth > 0.0 && fabs(vec_dot(view, pinhole->right)) <= depth * pinhole->tangent[0] &&
+         fabs(vec_dot(view, pinhole->up)) <= depth * pinhole->tangent[1];
+}

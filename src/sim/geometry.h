@@ -41,6 +41,7 @@ static inline clt_vector vec_unit(clt_vector a) {
 typedef struct clt_rectangle {
   clt_vector corner, u, v;
   bool triangle;
+  int material;      /* of the scene */
   clt_vector normal; /* unit, along u x v */
   double albedo[3];  /* per channel, 0 <= albedo < 1 */
 } clt_rectangle;
@@ -83,7 +84,7 @@ bool clt_rectangles_may_be_parted(const clt_rectangle *rectangles, int count, in
 /* True where some point in front of a sees some point in front of b. */
 bool clt_rectangles_face(const clt_rectangle *a, const clt_rectangle *b);
 
-/* A pinhole projector: image coordinates x to the right and y up, each from -1 to 1 across the image. */
+/* A pinhole projector or camera: image coordinates x to the right and y up, each from -1 to 1 across the image. */
 typedef struct clt_pinhole {
   clt_vector position, right, up, forward; /* orthonormal axes: right = forward x up' for the scene's up' */
   double tangent[2];                       /* half-width and half-height of the image at distance 1 */
@@ -93,5 +94,7 @@ typedef struct clt_pinhole {
 bool clt_pinhole_aim(clt_pinhole *pinhole, clt_vector target, clt_vector up);
 /* Direction (not unit: its forward part is 1) through image coordinates x, y. */
 clt_vector clt_pinhole_direction(const clt_pinhole *pinhole, double x, double y);
+/* Whether a place lies in its image. */
+bool clt_pinhole_covers(const clt_pinhole *pinhole, clt_vector at);
 
 #endif

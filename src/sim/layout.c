@@ -9,7 +9,7 @@ clt_status clt_layout_init(clt_layout *layout, const clt_scene_description *desc
     status = clt_cells_init(&layout->cells, description, layout->visibility, error);
   }
   if (status == CLT_OK) {
-    status = clt_sights_init(&layout->sights, description, layout->visibility, layout->cells.lit, error);
+    status = clt_sights_init(&layout->sights, description, layout->visibility, &layout->cells, error);
   }
   if (status == CLT_OK && layout->sights.exchanging > 0) {
     status =

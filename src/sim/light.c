@@ -113,22 +113,36 @@ double clt_light_direct(const clt_light *light, int channel, int i) {
   return cells->direct[(size_t)channel * (size_t)cells->count + (size_t)i];
 }
 
-/* scratch = bounced V_i' */
-static void view_of(const clt_light *light, int i, double *scratch) {
+/* to += sum over row i of the list of weight * bounced */
+static void add_bounced(const clt_light *light, const clt_weights *list, int i, double *to) {
   const clt_mesh *mesh = &light->layout.mesh;
-  const clt_weights *sees = &mesh->sees;
   size_t used = (size_t)mesh->used;
   int first = mesh->count - mesh->used;
-  memset(scratch, 0, used * sizeof *scratch);
-  for (int k = sees->start[i]; k < sees->start[i + 1]; k++) {
-    const double *from = &light->bounced[(size_t)(sees->element[k] - first) * used];
+  for (int k = list->start[i]; k < list->start[i + 1]; k++) {
+    const double *from = &light->bounced[(size_t)(list->element[k] - first) * used];
     for (size_t e = 0; e < used; e++) {
-      scratch[e] += sees->weight[k] * from[e];
+      to[e] += list->weight[k] * from[e];
     }
   }
 }
 
-/* T_ij = F_i [i = j] + V_i bounced W_j' solid_angle_j intensity / pi */
+/* view = bounced (V_i + M_i)' + diag(albedo / area) M_i' */
+static void view_of(const clt_light *light, int channel, int i, double *view) {
+  const clt_mesh *mesh = &light->layout.mesh;
+  const clt_weights *mirrors = &mesh->mirrors[channel];
+  int first = mesh->count - mesh->used;
+  memset(view, 0, (size_t)mesh->used * sizeof *view);
+  add_bounced(light, &mesh->sees, i, view);
+  if (mirrors->rows > 0) {
+    add_bounced(light, mirrors, i, view);
+    for (int k = mirrors->start[i]; k < mirrors->start[i + 1]; k++) {
+      double scale = scaling(mesh, channel, (size_t)mirrors->element[k]);
+      view[mirrors->element[k] - first] += mirrors->weight[k] * scale * scale;
+    }
+  }
+}
+
+/* T_ij = F_i [i = j] + view_i W_j' solid_angle_j intensity / pi */
 void clt_light_row(const clt_light *light, int channel, int i, double *row, double *scratch) {
   const clt_mesh *mesh = &light->layout.mesh;
   const clt_cells *cells = &light->layout.cells;
@@ -137,7 +151,7 @@ void clt_light_row(const clt_light *light, int channel, int i, double *row, doub
   double intensity = light->layout.description->projector.intensity[channel];
   memset(row, 0, (size_t)cells->count * sizeof *row);
   if (mesh->count > 0) {
-    view_of(light, i, scratch);
+    view_of(light, channel, i, scratch);
     for (int j = 0; j < cells->count; j++) {
       double sum = 0.0;
       for (int k = lights->start[j]; k < lights->start[j + 1]; k++) {
@@ -217,7 +231,12 @@ clt_status clt_light_transport(const clt_scene_description *description, clt_tra
   clt_transport *transport = NULL;
   clt_status status = clt_light_init(&light, description, error);
   if (status == CLT_OK) {
-    *facts = (clt_light_facts){.facing = light.layout.sights.facing, .exchanging = light.layout.sights.exchanging};
+    const clt_layout *layout = &light.layout;
+    *facts = (clt_light_facts){
+        .facing = layout->sights.facing, .exchanging = layout->sights.exchanging, .glossy = layout->sights.glossy};
+    status = clt_occlusion_find(description, layout->visibility, &layout->cells, &facts->occlusion, error);
+  }
+  if (status == CLT_OK) {
     status = light.layout.mesh.count > 0 ? make_dense(&light, &transport, error)
                                          : make_diagonal(&light.layout, &transport, error);
   }

@@ -11,6 +11,7 @@
 #define CLT_SIM_LIGHT_H
 
 #include "sim/layout.h"
+#include "sim/occlusion.h"
 
 enum { CLT_ELEMENTS_MAX = 4800, CLT_ELEMENTS_WANTED = 1000 };
 
@@ -40,6 +41,8 @@ double clt_light_direct(const clt_light *light, int channel, int i);
 typedef struct clt_light_facts {
   int facing;     /* pairs of surfaces that face each other */
   int exchanging; /* surfaces that exchange light which reaches the picture; 0: T is diagonal */
+  int glossy;     /* surfaces with gloss that the camera sees */
+  clt_occlusion occlusion;
 } clt_light_facts;
 
 /* The whole transport of a scene of surfaces, for drive above the panel's black: T (1 - black). One entry a row where

@@ -7,7 +7,7 @@
 #define CLT_SIM_MESH_H
 
 #include "sim/cells.h"
-#include "sim/sights.h"
+#include "sim/division.h"
 #include "sim/weights.h"
 
 typedef struct clt_mesh {
@@ -21,15 +21,11 @@ typedef struct clt_mesh {
   /* of row i: the elements that the camera sees in it, by shares of what it sees. Where the camera stands at the
    * projector these are the arrays of `lights`. */
   clt_weights sees;
-  /* mirrors[c] of row i: the elements whose light the gloss of what the camera sees there throws to it, in channel c,
-   * times pi radiance over radiosity. No rows (start is NULL) without gloss; channels of equal gloss share arrays. */
+  /* mirrors[c] of row i: the elements whose light the gloss of what the camera sees there throws to the camera, in
+   * channel c, by what their radiance counts in the cell's. No rows (start is NULL) without gloss; channels of equal
+   * gloss share arrays. */
   clt_weights mirrors[CLT_SIM_CHANNELS_MAX];
 } clt_mesh;
-
-/* How many elements there should be: at least `wanted`, at most `most`. */
-typedef struct clt_mesh_size {
-  int wanted, most;
-} clt_mesh_size;
 
 /* Divides the surfaces that exchange light into elements about as large as the median footprint of a cell, smaller
  * where that gives fewer than size.wanted, larger where it gives more than size.most; then finds what the cells have to

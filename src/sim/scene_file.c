@@ -62,19 +62,25 @@ static void read_grid(clt_section root, clt_scene_description *description) {
   }
 }
 
-static void read_pose(clt_section section, clt_scene_description *description) {
-  clt_projector_description *projector = &description->projector;
-  projector->pinhole.position = clt_scene_read_vector(section, "position", (clt_vector){0.0, -3.0, 0.0});
+/* What a pinhole's keys say; who: "projector" or "camera". */
+static void read_pose(clt_section section, const char *who, const clt_pinhole *fallback, clt_pinhole *pinhole) {
+  *pinhole = *fallback;
+  pinhole->position = clt_scene_read_vector(section, "position", fallback->position);
   clt_vector target = clt_scene_read_vector(section, "target", (clt_vector){0.0, 0.0, 0.0});
   clt_vector up = clt_scene_read_vector(section, "up", (clt_vector){0.0, 0.0, 1.0});
-  projector->pinhole.tangent[0] = 0.44;
-  projector->pinhole.tangent[1] = 0.33;
-  clt_read_numbers(section, "tangent", projector->pinhole.tangent, 2, 2, 1e-3, 10.0);
-  clt_scene_read_channels(section, "intensity", description->channels, 30.0, 1e-6, 1e9, projector->intensity);
-  if (vec_length(vec_sub(target, projector->pinhole.position)) < 1e-6) {
-    clt_section_fail(section, "target", "is the projector's position; it must lie somewhere else");
-  } else if (!clt_pinhole_aim(&projector->pinhole, target, up)) {
+  clt_read_numbers(section, "tangent", pinhole->tangent, 2, 2, 1e-3, 10.0);
+  if (vec_length(vec_sub(target, pinhole->position)) < 1e-6) {
+    clt_section_fail(section, "target", "is the %s's position; it must lie somewhere else", who);
+  } else if (!clt_pinhole_aim(pinhole, target, up)) {
     clt_section_fail(section, "up", "is zero or parallel to the view; it must point across it");
+  }
+}
+
+static void refuse_geometry(clt_section section) {
+  for (size_t k = 0; k < sizeof geometry_keys / sizeof geometry_keys[0]; k++) {
+    if (clt_section_has(section, geometry_keys[k])) {
+      clt_section_fail(section, geometry_keys[k], "means nothing beside transport_file; leave it out");
+    }
   }
 }
 
@@ -82,13 +88,11 @@ static void read_projector(clt_section root, clt_scene_description *description)
   clt_section section = clt_section_group(root, "projector");
   clt_projector_description *projector = &description->projector;
   if (description->transport == NULL) {
-    read_pose(section, description);
+    const clt_pinhole usual = {.position = {0.0, -3.0, 0.0}, .tangent = {0.44, 0.33}};
+    read_pose(section, "projector", &usual, &projector->pinhole);
+    clt_scene_read_channels(section, "intensity", description->channels, 30.0, 1e-6, 1e9, projector->intensity);
   } else {
-    for (size_t k = 0; k < sizeof geometry_keys / sizeof geometry_keys[0]; k++) {
-      if (clt_section_has(section, geometry_keys[k])) {
-        clt_section_fail(section, geometry_keys[k], "means nothing beside transport_file; leave it out");
-      }
-    }
+    refuse_geometry(section);
   }
   projector->response = read_curve(section, "srgb");
   projector->bits = clt_read_integer(section, "bits", 8, 1, 16);
@@ -97,8 +101,31 @@ static void read_projector(clt_section root, clt_scene_description *description)
   projector->latency_s = 1e-3 * clt_read_number(section, "latency_ms", 30.0, 0.0, 10000.0);
 }
 
-static void read_camera(clt_section root, clt_camera_description *camera) {
+/* A camera has a pose of its own with position and target, or none of a pose's keys. */
+static void read_camera_pose(clt_section section, clt_scene_description *description) {
+  clt_camera_description *camera = &description->camera;
+  bool given = false;
+  for (size_t k = 0; k < sizeof geometry_keys / sizeof geometry_keys[0]; k++) {
+    given = given || clt_section_has(section, geometry_keys[k]);
+  }
+  camera->placed = clt_section_has(section, "position") && clt_section_has(section, "target");
+  if (camera->placed) {
+    read_pose(section, "camera", &description->projector.pinhole, &camera->pinhole);
+  } else if (given) {
+    clt_section_fail(section, NULL,
+                     "a camera with a pose of its own needs position and target; without one leave out position, "
+                     "target, up and tangent: it then stands at the projector");
+  }
+}
+
+static void read_camera(clt_section root, clt_scene_description *description) {
   clt_section section = clt_section_group(root, "camera");
+  clt_camera_description *camera = &description->camera;
+  if (description->transport == NULL) {
+    read_camera_pose(section, description);
+  } else {
+    refuse_geometry(section);
+  }
   camera->cell_pixels = clt_read_integer(section, "cell_pixels", 2, 1, 16);
   camera->bits = clt_read_integer(section, "bits", 12, 8, 16);
   camera->response = read_curve(section, "linear");
@@ -126,7 +153,7 @@ static void read_scene(clt_section root, const char *path, clt_scene_description
     read_grid(root, description);
   }
   read_projector(root, description);
-  read_camera(root, &description->camera);
+  read_camera(root, description);
   clt_scene_read_channels(root, "ambient", description->channels, 0.002, 0.0, 1e6, description->ambient);
   description->seed = (uint64_t)clt_read_integer(root, "seed", 1, 0, 2147483647);
   clt_effects_read(root, description);
@@ -152,6 +179,7 @@ clt_status clt_scene_read(const char *path, clt_scene_description *description, 
   status = clt_settings_finish(settings, error);
   if (status == CLT_OK && description->surface_count > 0) {
     clt_scene_check_lit(root, description);
+    clt_scene_check_seen(root, description);
     status = clt_settings_finish(settings, error);
   }
   clt_settings_close(settings);
@@ -181,6 +209,19 @@ bool clt_scene_reserve_surfaces(clt_scene_description *description, int more) {
     description->surface_room = room;
   }
   return true;
+}
+
+clt_vector clt_scene_eye(const clt_scene_description *description) {
+  return description->camera.placed ? description->camera.pinhole.position : description->projector.pinhole.position;
+}
+
+bool clt_scene_is_glossy(const clt_scene_description *description, int surface) {
+  const clt_gloss *gloss = &description->gloss[description->surfaces[surface].material];
+  bool found = false;
+  for (int c = 0; c < description->channels; c++) {
+    found = found || gloss->strength[c] > 0.0;
+  }
+  return found;
 }
 
 double clt_ambient_most(const clt_scene_description *description) {

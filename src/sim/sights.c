@@ -74,36 +74,74 @@ static int join(search *s) {
   return facing;
 }
 
-/* Keeps the groups of two or more with a lit surface. reached: of each root, bit 0: lit; bit 1: has other members. */
-static void keep_reached(search *s, const bool *lit, unsigned char *reached, clt_sights *sights) {
+/* What is known of a surface, or of the group of a root. */
+enum { LIT = 1, SEEN = 2, MIRRORED = 4, JOINED = 8 };
+
+static bool throws_light(const clt_scene_description *description, int glossy, int from) {
+  const double *strength = description->gloss[description->surfaces[glossy].material].strength;
+  for (int c = 0; c < description->channels; c++) {
+    if (strength[c] > 0.0 && description->surfaces[from].albedo[c] > 0.0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* Marks the surfaces whose light the gloss of a seen one throws to the camera. Returns how many seen ones have gloss.
+ */
+static int mark_mirrored(search *s, const bool *seen, unsigned char *known) {
+  const clt_rectangle *surfaces = s->description->surfaces;
+  int glossy = 0;
+  for (int a = 0; a < s->description->surface_count; a++) {
+    if (!seen[a] || !clt_scene_is_glossy(s->description, a)) {
+      continue;
+    }
+    glossy++;
+    for (int b = 0; b < s->description->surface_count; b++) {
+      if (b != a && throws_light(s->description, a, b) && clt_rectangles_face(&surfaces[a], &surfaces[b]) &&
+          in_sight(s, a, b)) {
+        known[b] |= MIRRORED;
+      }
+    }
+  }
+  return glossy;
+}
+
+/* Keeps the groups that are lit and seen, in themselves or in gloss. A surface alone has no light but direct light,
+ * which only gloss brings to other cells. groups: of each root what is known of its members, zeros. */
+static void keep_reached(search *s, const unsigned char *known, unsigned char *groups, clt_sights *sights) {
   for (int k = 0; k < s->description->surface_count; k++) {
     int root = root_of(s, k);
-    reached[root] |= (unsigned char)((lit[k] ? 1 : 0) | (root != k ? 2 : 0));
+    groups[root] |= (unsigned char)(known[k] | (root != k ? JOINED : 0));
   }
   for (int k = 0; k < s->description->surface_count; k++) {
-    sights->exchange[k] = reached[root_of(s, k)] == 3;
+    int group = groups[root_of(s, k)];
+    bool seen = (group & MIRRORED) != 0 || (group & (SEEN | JOINED)) == (SEEN | JOINED);
+    sights->exchange[k] = (group & LIT) != 0 && seen;
     sights->exchanging += sights->exchange[k];
   }
 }
 
 clt_status clt_sights_init(clt_sights *sights, const clt_scene_description *description,
-                           const clt_visibility *visibility, const bool *lit, clt_error *error) {
+                           const clt_visibility *visibility, const clt_cells *cells, clt_error *error) {
   size_t count = (size_t)description->surface_count;
   search s = {description, visibility, clt_alloc(count, sizeof *s.parent), 0};
-  unsigned char *reached = clt_alloc(count, 1);
+  unsigned char *known = clt_alloc(2 * count, 1);
   sights->exchange = clt_alloc(count, sizeof *sights->exchange);
-  if (!s.parent || !reached || !sights->exchange) {
+  if (!s.parent || !known || !sights->exchange) {
     free(s.parent);
-    free(reached);
+    free(known);
     return clt_fail(error, CLT_FAILED, "%s: out of memory for %zu surfaces", description->path, count);
   }
   for (int k = 0; k < description->surface_count; k++) {
     s.parent[k] = k;
+    known[k] = (unsigned char)((cells->lit[k] ? LIT : 0) | (cells->seen[k] ? SEEN : 0));
   }
   sights->facing = join(&s);
-  keep_reached(&s, lit, reached, sights);
+  sights->glossy = mark_mirrored(&s, cells->seen, known);
+  keep_reached(&s, known, known + count, sights);
   free(s.parent);
-  free(reached);
+  free(known);
   return CLT_OK;
 }
 

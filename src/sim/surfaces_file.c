@@ -1,51 +1,14 @@
 #include <string.h>
 
 #include "base/file.h"
+#include "sim/cells.h"
 #include "sim/mesh_file.h"
 #include "sim/scene_file.h"
 #include "sim/shapes.h"
 #include "sim/visibility.h"
 
 /* Entries of the lists of a scene file. */
-enum { MATERIALS_MAX = 64, ENTRIES_MAX = 64, PIECES_MAX = 360 };
-
-typedef struct material {
-  const char *name;
-  double albedo[CLT_SIM_CHANNELS_MAX];
-} material;
-
-static const material *find_material(const material *materials, int count, const char *name) {
-  for (int k = 0; k < count; k++) {
-    if (materials[k].name != NULL && strcmp(materials[k].name, name) == 0) {
-      return &materials[k];
-    }
-  }
-  return NULL;
-}
-
-static int read_materials(clt_section root, int channels, material *materials) {
-  int count = clt_section_count(root, "materials");
-  if (count > MATERIALS_MAX) {
-    clt_section_fail(root, "materials", "has %d materials; legal is at most %d", count, MATERIALS_MAX);
-    return 0;
-  }
-  for (int k = 0; k < count; k++) {
-    clt_section item = clt_section_item(root, "materials", k);
-    materials[k].name = clt_read_text(item, "name", NULL, 64);
-    if (materials[k].name == NULL) {
-      clt_section_fail(item, NULL, "a material needs name = \"...\"");
-    } else if (find_material(materials, k, materials[k].name) != NULL) {
-      clt_section_fail(item, "name", "\"%s\" is given to two materials", materials[k].name);
-    }
-    clt_scene_read_channels(item, "albedo", channels, 0.5, 0.0, 1.0, materials[k].albedo);
-    for (int c = 0; c < channels; c++) {
-      if (materials[k].albedo[c] >= 1.0) {
-        clt_section_fail(item, "albedo", "is %g; legal is 0 to below 1", materials[k].albedo[c]);
-      }
-    }
-  }
-  return count;
-}
+enum { ENTRIES_MAX = 64, PIECES_MAX = 360 };
 
 /* A point or direction that must be given. */
 static clt_vector read_needed(clt_section item, const char *what, const char *key, clt_vector fallback) {
@@ -193,15 +156,17 @@ static const struct type {
              {"mesh", read_mesh}};
 enum { TYPES = sizeof types / sizeof types[0] };
 
-static void read_surface(clt_section item, const material *materials, int count, clt_scene_description *description) {
+static void read_surface(clt_section item, const clt_material *materials, int count,
+                         clt_scene_description *description) {
   const char *names[TYPES + 1] = {NULL};
   for (int k = 0; k < TYPES; k++) {
     names[k] = types[k].name;
   }
   const struct type *type = &types[clt_read_choice(item, "type", 0, names)];
   const char *name = clt_read_text(item, "material", "", 64);
-  const material *found = find_material(materials, count, name);
+  const clt_material *found = clt_scene_find_material(materials, count, name);
   const double black[CLT_SIM_CHANNELS_MAX] = {0.0};
+  int first = description->surface_count;
   if (!type->read(item, found != NULL ? found->albedo : black, description)) {
     clt_section_fail(item, NULL, "does not fit: a scene has at most %d flat surfaces; take fewer pieces",
                      CLT_SURFACES_MAX);
@@ -209,11 +174,14 @@ static void read_surface(clt_section item, const material *materials, int count,
   if (found == NULL) {
     clt_section_fail(item, "material", "\"%s\" is not among the materials; give one of their names", name);
   }
+  for (int k = first; k < description->surface_count && found != NULL; k++) {
+    description->surfaces[k].material = (int)(found - materials);
+  }
 }
 
 void clt_scene_read_surfaces(clt_section root, clt_scene_description *description) {
-  material materials[MATERIALS_MAX];
-  int known = read_materials(root, description->channels, materials);
+  clt_material materials[CLT_MATERIALS_MAX];
+  int known = clt_scene_read_materials(root, description, materials);
   int count = clt_section_count(root, "surfaces");
   if (count < 1 || count > ENTRIES_MAX) {
     clt_section_fail(root, "surfaces", "has %d surfaces; legal is 1 to %d", count, ENTRIES_MAX);
@@ -273,6 +241,30 @@ void clt_scene_check_lit(clt_section root, const clt_scene_description *descript
                            : "its light meets no surface; check position, target and tangent");
   }
   clt_visibility_destroy(visibility);
+}
+
+void clt_scene_check_seen(clt_section root, const clt_scene_description *description) {
+  clt_visibility *visibility = NULL;
+  clt_error error = {.status = CLT_OK};
+  if (!description->camera.placed) {
+    return;
+  }
+  if (clt_visibility_create(description->surfaces, description->surface_count, &visibility, &error) != CLT_OK) {
+    clt_section_fail(root, "surfaces", "%s", error.message);
+    return;
+  }
+  bool seen = false;
+  for (int cell = 0; cell < description->width * description->height && !seen; cell++) {
+    clt_ray_end ends[CLT_CELL_RAYS_MAX];
+    clt_cell_trace(description, visibility, cell, ends);
+    for (int ray = 0; ray < description->rays * description->rays; ray++) {
+      seen = seen || ends[ray].view > 0.0;
+    }
+  }
+  clt_visibility_destroy(visibility);
+  if (!seen) {
+    clt_section_fail(root, "camera", "sees nothing that the projector lights; check position, target and tangent");
+  }
 }
 
 clt_vector clt_scene_ray(const clt_scene_description *description, int cell, int ray, double *solid_angle) {

@@ -17,6 +17,10 @@ typedef struct clt_weights {
  * case. */
 bool clt_weights_init(clt_weights *weights, int rows);
 void clt_weights_finish(clt_weights *weights);
+/* Entries of all rows together. */
+static inline int clt_weights_count(const clt_weights *weights) {
+  return weights->rows > 0 ? weights->start[weights->rows] : 0;
+}
 /* Appends a row of `count` entries, copied; false where memory is short. */
 bool clt_weights_append(clt_weights *weights, const int *element, const double *weight, int count);
 
