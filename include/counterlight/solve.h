@@ -77,6 +77,10 @@ typedef struct clt_solve_result {
 CLT_PUBLIC const char *clt_method_name(size_t index);
 /* One sentence on what the method is and when it serves. */
 CLT_PUBLIC const char *clt_method_summary(size_t index);
+/* True where making the method ready costs as much as many solves by products: it serves one transport and many
+ * targets.
+ */
+CLT_PUBLIC bool clt_method_invests(size_t index);
 
 /* A method made ready for one transport: its workspace, and what it keeps from solve to solve (a factor, a stored
  * inverse). One solve at a time. */

@@ -28,6 +28,9 @@ clt_status demo_race_methods(demo *d, clt_error *error) {
   fill_wanted(d, wanted);
   const char *name;
   for (size_t i = 0; (name = clt_method_name(i)) && d->race.count < DEMO_RACE_MAX; i++) {
+    if (clt_method_invests(i)) {
+      continue; /* one target does not repay it */
+    }
     clt_solve_options options = race_options;
     clt_solve_result *run = &d->race.runs[d->race.count];
     options.method = name;

@@ -286,6 +286,7 @@ const clt_method clt_method_clusters = {
     .summary = "clusters of at most 256 cells that light each other most, each inverted on its own (Wetzstein & Bimber "
                "2007), iterated for the light between them; up to 12288 lit cells",
     .apart = true,
+    .invests = true,
     .vectors = 3,
     .prepare = prepare,
     .release = release,

@@ -146,6 +146,7 @@ const clt_method clt_method_direct = {
     .summary = "LAPACK's Cholesky factor of the flux-symmetrised S where it is reciprocal, LU elsewhere, refined by "
                "products with T; up to 12288 lit cells, at any albedo",
     .apart = true,
+    .invests = true,
     .vectors = CLT_REFINE_VECTORS,
     .prepare = prepare,
     .release = release,

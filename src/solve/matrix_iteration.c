@@ -144,6 +144,7 @@ const clt_method clt_method_matrix = {
         "the report's iteration for the whole inverse, X = I - R X (eq. 45), made once; then one product a frame; "
         "where rho(R) < 1, up to 12288 lit cells",
     .apart = true,
+    .invests = true,
     .vectors = CLT_REFINE_VECTORS,
     .check = check,
     .prepare = prepare,

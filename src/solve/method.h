@@ -43,6 +43,7 @@ typedef struct clt_method {
   bool bounded;     /* keeps 0 <= x <= 1 */
   bool rectangular; /* takes systems with rows != cols */
   bool apart;       /* works on single channels only */
+  bool invests;     /* making it ready costs as much as many solves by products */
   size_t vectors;
   /* NULL, or fails with CLT_BAD_INPUT where the certificate of a channel shows that the method cannot serve. */
   clt_status (*check)(const clt_channel_certificate *channel, clt_error *error);

@@ -135,6 +135,7 @@ const clt_method clt_method_montecarlo = {
         "paths drawn from the rows of R (eq. 47-50), 30 a cell, a final gather, and again on what is left; the same "
         "for any number of threads; where rho(R) < 1, up to 12288 lit cells",
     .apart = true,
+    .invests = true,
     .vectors = CLT_REFINE_VECTORS + 1,
     .check = check,
     .prepare = prepare,
@@ -148,6 +149,7 @@ const clt_method clt_method_hybrid = {
         "the report's iteration with 30 columns drawn of each row (section 8), a final gather, and again on what is "
         "left; where rho(R) < 1, up to 12288 lit cells",
     .apart = true,
+    .invests = true,
     .vectors = CLT_REFINE_VECTORS + 1,
     .check = check,
     .prepare = prepare_hybrid,

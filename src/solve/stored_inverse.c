@@ -92,6 +92,7 @@ const clt_method clt_method_stored_inverse = {
         "A = I - S^-1 kept in single precision: one product a frame down to about 1e-5, refined by products with "
         "T below; up to 12288 lit cells",
     .apart = true,
+    .invests = true,
     .vectors = CLT_REFINE_VECTORS,
     .prepare = prepare,
     .release = release,

@@ -19,6 +19,10 @@ const char *clt_method_summary(size_t index) {
   return index < METHOD_COUNT ? clt_methods[index]->summary : NULL;
 }
 
+bool clt_method_invests(size_t index) {
+  return index < METHOD_COUNT && clt_methods[index]->invests;
+}
+
 const clt_method *clt_method_find(const char *name) {
   for (size_t i = 0; i < METHOD_COUNT; i++) {
     if (strcmp(clt_methods[i]->name, name) == 0) {

@@ -147,6 +147,7 @@ const clt_method clt_method_wavelet = {
     .summary = "R in Daubechies' D4 wavelets of the grid with its small coefficients left out, iterated there and "
                "corrected by products with T; the fastest at tolerances of a percent, up to 12288 cells",
     .apart = true,
+    .invests = true,
     .vectors = CLT_REFINE_VECTORS + 2 + CLT_GMRES_VECTORS,
     .prepare = prepare,
     .release = release,

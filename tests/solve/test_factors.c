@@ -271,6 +271,18 @@ static void too_many_cells_are_refused(void **state) {
   room_free(&room);
 }
 
+/* Only methods that keep something for the next solve count as investing. */
+static void what_is_kept_is_told(void **state) {
+  (void)state;
+  for (size_t i = 0; clt_method_name(i) != NULL; i++) {
+    for (size_t m = 0; m < 4; m++) {
+      assert_true(strcmp(clt_method_name(i), KEPT[m]) != 0 || clt_method_invests(i));
+    }
+    assert_false(strcmp(clt_method_name(i), "jacobi") == 0 && clt_method_invests(i));
+    assert_false(strcmp(clt_method_name(i), "pcg") == 0 && clt_method_invests(i));
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(reach_the_lu_solution_to_any_tolerance),
@@ -284,6 +296,7 @@ int main(void) {
       cmocka_unit_test(dark_cells_take_no_part),
       cmocka_unit_test(limits_and_warm_starts),
       cmocka_unit_test(too_many_cells_are_refused),
+      cmocka_unit_test(what_is_kept_is_told),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
