@@ -4,6 +4,7 @@
 #define COUNTERLIGHT_H
 
 #include "counterlight/acquire.h"
+#include "counterlight/analysis.h"
 #include "counterlight/device.h"
 #include "counterlight/image.h"
 #include "counterlight/rig.h"

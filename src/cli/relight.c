@@ -1,10 +1,8 @@
 /* counterlight relight: what the room looks like under a drive, or the projector's view of light from the camera. */
-#include <stdlib.h>
-
-#include "base/memory.h"
 #include "cli/answer.h"
 #include "cli/command.h"
 #include "cli/transport_input.h"
+#include "counterlight/analysis.h"
 
 static const cli_option options[] = {
     {"light", 'l', "PIC", "the drive, or with --dual the light at the camera"},
@@ -36,40 +34,13 @@ static clt_status read_options(const cli_command *command, const cli_arguments *
   return status ? status : cli_picture_output_check(t->output, error);
 }
 
-/* x = T' y per channel: what a lamp at the projector would be seen to receive from light y at the camera. */
-static clt_status apply_dual(const clt_transport *transport, const clt_image *light, clt_image *seen,
-                             clt_error *error) {
-  clt_transport_info info = clt_transport_describe(transport);
-  double *y = clt_alloc(info.rows, sizeof *y), *x = clt_alloc(info.cols, sizeof *x);
-  clt_status status = CLT_OK;
-  if (!y || !x) {
-    status = clt_fail(error, CLT_FAILED, "out of memory for %zu cells", info.rows);
-  } else if (info.rows != info.cols) {
-    status = clt_fail(error, CLT_BAD_INPUT, "--dual needs a transport whose camera shares the projector's grid");
-  } else {
-    status = clt_image_init(seen, info.channels, info.height, info.width, error);
-  }
-  for (int c = 0; !status && c < info.channels; c++) {
-    for (size_t i = 0; i < info.rows; i++) {
-      y[i] = light->data[(size_t)c * info.rows + i];
-    }
-    clt_transport_apply_transposed(transport, c, y, x);
-    for (size_t i = 0; i < info.cols; i++) {
-      seen->data[(size_t)c * info.cols + i] = (float)x[i];
-    }
-  }
-  free(y);
-  free(x);
-  return status;
-}
-
 static clt_status relight(task *t, clt_error *error) {
   const clt_curve *curve = t->dual ? NULL : &t->input.response;
   clt_status status = cli_picture_read(t->light, curve, &t->input.grid, &t->drive, error);
   if (status) {
     return status;
   }
-  return t->dual ? apply_dual(t->input.transport, &t->drive, &t->seen, error)
+  return t->dual ? clt_dual_photograph(t->input.transport, &t->drive, &t->seen, error)
                  : clt_predict(t->input.transport, &t->drive, &t->seen, error);
 }
 
