@@ -36,6 +36,23 @@ CLT_PUBLIC void clt_scene_rig_config(const clt_scene *scene, clt_rig_config *con
 CLT_PUBLIC clt_status clt_scene_appearance(const clt_scene *scene, const clt_image *drive, clt_image *radiance,
                                            clt_error *error);
 
+/* How far the simulated light of some cells is from their exact light, over all channels. */
+typedef struct clt_reference {
+  int cells;      /* that were compared */
+  double rms;     /* of the difference, relative to the rms of the exact light */
+  double largest; /* difference, relative to the same */
+  double bound;   /* that the rms of the light's own error cannot exceed, given the differences found */
+} clt_reference;
+/* Compares T drive, as the scene computes it, with exactly computed rows at `cells` cells spread over the grid
+ * (fewer where the grid has fewer). Small scenes: rows of T in double. Large ones, whose exchange of light is held
+ * approximately: the light that reaches what the cell shows is gathered from every element of the scene, each by its
+ * form factor and visibility in double; the difference r is the residual of the light equation, and bounds the light's
+ * own error by r / (1 - m), m the greatest albedo. CLT_BAD_INPUT for a scene of a transport file, and for glossy light
+ * of a large one. Takes about a second for every three cells of a grid of 512 x 256. Call it while no device of the
+ * scene is in use. */
+CLT_PUBLIC clt_status clt_scene_reference(const clt_scene *scene, const clt_image *drive, int cells, clt_reference *out,
+                                          clt_error *error);
+
 enum { CLT_EFFECTS = 22, CLT_EFFECT_WHY_MAX = 160 };
 /* What the simulation does about one effect in one scene. */
 typedef struct clt_effect_report {

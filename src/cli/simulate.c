@@ -10,13 +10,16 @@ static const cli_option options[] = {
     {"drive", 'd', "PIC", "what the projector shows"},
     {"output", 'o', "OUT", "where the picture goes (.png, .exr, .npy)"},
     {"exact", 0, NULL, "the scene's noise-free radiance, without a camera"},
+    {"reference", 0, "N", "compare the light of N cells with exactly computed rows, and say how far it is off"},
     {NULL, 0, NULL, NULL},
 };
 
 static const char notes[] =
     "Photographs the scene through its own simulated projector and camera, noise included, as the rig does it:\n"
     "exposure bracket, black level and response curves undone, means over the grid's cells, b0 included.\n"
-    "--exact takes b0 + T x from the scene instead.\n"
+    "--exact takes b0 + T x from the scene instead. --reference N says how far the simulated light is from the exact\n"
+    "one at N cells spread over the grid: at most 6400 cells by rows of T in double, above by gathering the light of\n"
+    "every surface element by its form factor.\n"
     "A .png or .jpg drive holds panel values and is decoded by the scene's projector response; .exr and .npy hold\n"
     "linear light in 0..1. A .png result is divided by the scene's white (the median direct light of a fully driven\n"
     "cell) and sRGB-encoded; .exr and .npy hold the radiance.\n";
@@ -24,6 +27,8 @@ static const char notes[] =
 typedef struct task {
   const char *drive_path, *output;
   bool exact;
+  int reference_cells; /* 0: none */
+  clt_reference reference;
   clt_station_config config;
   clt_station station;
   clt_rig_config rig;
@@ -38,6 +43,9 @@ static clt_status read_options(const cli_command *command, const cli_arguments *
     status = cli_required(command, arguments, "output", &t->output, error);
   }
   t->exact = cli_value(command, arguments, "exact") != NULL;
+  if (!status) {
+    status = cli_integer(command, arguments, "reference", 1, 4096, &t->reference_cells, error);
+  }
   return status ? status : cli_picture_output_check(t->output, error);
 }
 
@@ -82,16 +90,30 @@ static clt_status simulate(const char *path, task *t, clt_error *error) {
   if (!status) {
     status = t->exact ? clt_scene_appearance(t->station.scene, &t->drive, &t->seen, error) : photograph(t, error);
   }
+  if (!status && t->reference_cells > 0) {
+    status = clt_scene_reference(t->station.scene, &t->drive, t->reference_cells, &t->reference, error);
+  }
   return status ? status : cli_radiance_write(t->output, &t->seen, t->white, error);
 }
 
 static int answer(const cli_arguments *arguments, const task *t) {
+  const clt_reference *found = &t->reference;
   if (arguments->json) {
-    return cli_print_json(json_pack("{s:s, s:b, s:o, s:o}", "output", t->output, "exact", t->exact, "grid",
-                                    cli_json_grid(&t->grid), "white", cli_json_numbers(t->white, t->grid.channels)));
+    json_t *document = json_pack("{s:s, s:b, s:o, s:o}", "output", t->output, "exact", t->exact, "grid",
+                                 cli_json_grid(&t->grid), "white", cli_json_numbers(t->white, t->grid.channels));
+    if (found->cells > 0) {
+      json_object_set_new(document, "reference",
+                          json_pack("{s:i, s:f, s:f, s:f}", "cells", found->cells, "rms", found->rms, "largest",
+                                    found->largest, "bound", found->bound));
+    }
+    return cli_print_json(document);
   }
   if (!arguments->quiet) {
     printf("%s: %s\n", t->output, t->exact ? "the scene's exact radiance" : "the scene as its camera saw it");
+    if (found->cells > 0) {
+      printf("its light is %.2g off the exact one (rms of %d cells; largest %.2g, bound %.2g)\n", found->rms,
+             found->cells, found->largest, found->bound);
+    }
   }
   return CLI_DONE;
 }
@@ -113,7 +135,7 @@ static int run(const cli_command *command, const cli_arguments *arguments) {
 
 const cli_command cli_command_simulate = {
     .name = "simulate",
-    .synopsis = "SCENE --drive PIC -o OUT [--exact]",
+    .synopsis = "SCENE --drive PIC -o OUT [--exact] [--reference N]",
     .summary = "photograph a simulated scene under a drive",
     .options = options,
     .positional_least = 1,

@@ -36,8 +36,8 @@ clt_status clt_appearance_init(clt_appearance *appearance, const clt_transport *
   appearance->cells = cells;
   appearance->channels = info.channels;
   appearance->driven = clt_alloc(cells, sizeof *appearance->driven);
-  appearance->drive = clt_alloc(cells, sizeof *appearance->drive);
-  appearance->seen = clt_alloc(cells, sizeof *appearance->seen);
+  appearance->drive = clt_alloc((size_t)info.channels * cells, sizeof *appearance->drive);
+  appearance->seen = clt_alloc((size_t)info.channels * cells, sizeof *appearance->seen);
   bool enough = appearance->driven && appearance->drive && appearance->seen;
   for (int c = 0; c < info.channels && enough && clt_transport_entries(transport, c) != NULL; c++) {
     int same = twin(transport, c, square * sizeof(float));
@@ -73,8 +73,8 @@ void clt_appearance_finish(clt_appearance *appearance) {
 }
 
 size_t clt_appearance_bytes(const clt_appearance *appearance) {
-  size_t bytes =
-      appearance->cells * (sizeof *appearance->driven + sizeof *appearance->drive + sizeof *appearance->seen);
+  size_t bytes = appearance->cells * sizeof *appearance->driven +
+                 (size_t)appearance->channels * appearance->cells * 2 * sizeof *appearance->drive;
   for (int c = 0; c < appearance->channels; c++) {
     if (appearance->columns[c] != NULL && !shares_columns(appearance, c)) {
       bytes += appearance->cells * appearance->cells * sizeof *appearance->columns[c];
@@ -101,24 +101,38 @@ static void add_columns(clt_appearance *appearance, const float *columns, size_t
   }
 }
 
+/* By the columns of the cells that are driven. */
+static void light_columns(clt_appearance *appearance, const float *drive, int c) {
+  size_t cells = appearance->cells, driven = 0;
+  for (size_t j = 0; j < cells; j++) {
+    appearance->drive[j] = (double)drive[j];
+    appearance->driven[driven] = j;
+    driven += drive[j] != 0.0f;
+  }
+  memset(appearance->seen, 0, cells * sizeof *appearance->seen);
+  add_columns(appearance, appearance->columns[c], driven);
+}
+
+static void add_black(const clt_appearance *appearance, int c, const double *seen, float *radiance) {
+  const float *black = clt_transport_black(appearance->transport, c);
+  for (size_t i = 0; i < appearance->cells; i++) {
+    radiance[i] = (float)((double)black[i] + seen[i]);
+  }
+}
+
 void clt_appearance_of(clt_appearance *appearance, const float *drive, float *radiance) {
   size_t cells = appearance->cells;
+  if (appearance->columns[0] == NULL) {
+    for (size_t k = 0; k < (size_t)appearance->channels * cells; k++) {
+      appearance->drive[k] = (double)drive[k];
+    }
+    clt_transport_apply_all(appearance->transport, appearance->drive, appearance->seen);
+  }
   for (int c = 0; c < appearance->channels; c++) {
-    const float *black = clt_transport_black(appearance->transport, c);
-    size_t driven = 0;
-    for (size_t j = 0; j < cells; j++) {
-      appearance->drive[j] = (double)drive[(size_t)c * cells + j];
-      appearance->driven[driven] = j;
-      driven += appearance->drive[j] != 0.0;
+    const double *seen = &appearance->seen[appearance->columns[0] == NULL ? (size_t)c * cells : 0];
+    if (appearance->columns[0] != NULL) {
+      light_columns(appearance, &drive[(size_t)c * cells], c);
     }
-    memset(appearance->seen, 0, cells * sizeof *appearance->seen);
-    if (appearance->columns[c] != NULL) {
-      add_columns(appearance, appearance->columns[c], driven);
-    } else {
-      clt_transport_apply(appearance->transport, c, appearance->drive, appearance->seen);
-    }
-    for (size_t i = 0; i < cells; i++) {
-      radiance[(size_t)c * cells + i] = (float)((double)black[i] + appearance->seen[i]);
-    }
+    add_black(appearance, c, seen, &radiance[(size_t)c * cells]);
   }
 }

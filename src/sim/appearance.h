@@ -13,7 +13,7 @@ typedef struct clt_appearance {
    * channels with the same T share it. NULL of other storage, whose products are cheap themselves. */
   float *columns[CLT_SIM_CHANNELS_MAX];
   size_t *driven;       /* cells values of work space */
-  double *drive, *seen; /* cells values each of work space */
+  double *drive, *seen; /* channels * cells values each of work space */
 } clt_appearance;
 
 /* appearance was zeroed by the caller and is finished by it in either case. */

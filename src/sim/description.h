@@ -10,7 +10,8 @@
 
 enum {
   CLT_SURFACES_MAX = 2000,
-  CLT_RECTANGLE_CELLS_MAX = 6400,
+  CLT_RECTANGLE_CELLS_MAX = 1024 * 576,
+  CLT_FINE_GRID = 6400, /* up to so many cells light is computed as a whole matrix; more are lit by few rays each */
   CLT_EXPOSURE_DELAY_MAX = 8,
   CLT_SIM_CHANNELS_MAX = 3,
   CLT_MATERIALS_MAX = 64

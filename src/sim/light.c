@@ -6,6 +6,7 @@
 
 #include "base/memory.h"
 #include "sim/exchange.h"
+#include "sim/radiosity.h"
 
 clt_status clt_light_init(clt_light *light, const clt_scene_description *description, clt_error *error) {
   const clt_mesh_size size = {.wanted = CLT_ELEMENTS_WANTED, .most = CLT_ELEMENTS_MAX};
@@ -225,22 +226,46 @@ static clt_status make_diagonal(const clt_layout *layout, clt_transport **out, c
   return status;
 }
 
-clt_status clt_light_transport(const clt_scene_description *description, clt_transport **out, clt_light_facts *facts,
-                               clt_error *error) {
+static clt_status find_facts(const clt_layout *layout, clt_light_facts *facts, clt_error *error) {
+  *facts = (clt_light_facts){
+      .facing = layout->sights.facing, .exchanging = layout->sights.exchanging, .glossy = layout->sights.glossy};
+  return clt_occlusion_find(layout->description, layout->visibility, &layout->cells, &facts->occlusion, error);
+}
+
+static clt_status few_cells(const clt_scene_description *description, clt_transport **out, clt_light_facts *facts,
+                            clt_error *error) {
   clt_light light = {.solved = -1};
-  clt_transport *transport = NULL;
   clt_status status = clt_light_init(&light, description, error);
   if (status == CLT_OK) {
-    const clt_layout *layout = &light.layout;
-    *facts = (clt_light_facts){
-        .facing = layout->sights.facing, .exchanging = layout->sights.exchanging, .glossy = layout->sights.glossy};
-    status = clt_occlusion_find(description, layout->visibility, &layout->cells, &facts->occlusion, error);
+    status = find_facts(&light.layout, facts, error);
   }
   if (status == CLT_OK) {
-    status = light.layout.mesh.count > 0 ? make_dense(&light, &transport, error)
-                                         : make_diagonal(&light.layout, &transport, error);
+    status = light.layout.mesh.count > 0 ? make_dense(&light, out, error) : make_diagonal(&light.layout, out, error);
   }
   clt_light_finish(&light);
+  return status;
+}
+
+static clt_status many_cells(const clt_scene_description *description, clt_transport **out, clt_light_facts *facts,
+                             clt_error *error) {
+  clt_layout layout = {0};
+  clt_status status = clt_layout_init(&layout, description, clt_radiosity_mesh_size(description), error);
+  if (status == CLT_OK) {
+    status = find_facts(&layout, facts, error);
+  }
+  if (status == CLT_OK) {
+    status = layout.mesh.count > 0 ? clt_radiosity_transport(&layout, out, error) : make_diagonal(&layout, out, error);
+  }
+  clt_layout_finish(&layout);
+  return status;
+}
+
+clt_status clt_light_transport(const clt_scene_description *description, clt_transport **out, clt_light_facts *facts,
+                               clt_error *error) {
+  clt_transport *transport = NULL;
+  bool few = description->width * description->height <= CLT_FINE_GRID;
+  clt_status status =
+      few ? few_cells(description, &transport, facts, error) : many_cells(description, &transport, facts, error);
   if (status != CLT_OK) {
     clt_transport_destroy(transport);
     return status;

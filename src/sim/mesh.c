@@ -87,7 +87,7 @@ clt_status clt_mesh_init(clt_mesh *mesh, const clt_scene_description *descriptio
                            description->path);
 }
 
-void clt_mesh_finish(clt_mesh *mesh) {
+void clt_mesh_drop_lists(clt_mesh *mesh) {
   clt_weights *lists[] = {&mesh->lights, &mesh->sees, &mesh->mirrors[0], &mesh->mirrors[1], &mesh->mirrors[2]};
   enum { LISTS = sizeof lists / sizeof lists[0] };
   for (int k = LISTS - 1; k >= 0; k--) {
@@ -95,10 +95,16 @@ void clt_mesh_finish(clt_mesh *mesh) {
     for (int before = 0; before < k; before++) {
       shared = shared || lists[before]->start == lists[k]->start;
     }
-    if (!shared) {
+    if (shared) {
+      *lists[k] = (clt_weights){0};
+    } else {
       clt_weights_finish(lists[k]);
     }
   }
+}
+
+void clt_mesh_finish(clt_mesh *mesh) {
+  clt_mesh_drop_lists(mesh);
   free(mesh->elements);
   free(mesh->surface);
   *mesh = (clt_mesh){0};

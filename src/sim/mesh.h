@@ -33,6 +33,8 @@ typedef struct clt_mesh {
  * either case. */
 clt_status clt_mesh_init(clt_mesh *mesh, const clt_scene_description *description, const clt_visibility *visibility,
                          const clt_cells *cells, const clt_sights *sights, clt_mesh_size size, clt_error *error);
+/* Lets the lists of the cells go; the elements stay. */
+void clt_mesh_drop_lists(clt_mesh *mesh);
 void clt_mesh_finish(clt_mesh *mesh);
 
 #endif

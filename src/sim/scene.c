@@ -19,8 +19,12 @@ static clt_status take_flood(clt_scene *scene, clt_error *error) {
   if (scene->flood == NULL || scene->added == NULL) {
     return out_of_memory(scene, error);
   }
+  for (size_t k = 0; k < channels * cells; k++) {
+    scene->added[k] = 1.0;
+  }
+  clt_transport_apply_all(scene->transport, scene->added, scene->flood);
+  memset(scene->added, 0, channels * cells * sizeof *scene->added);
   for (size_t c = 0; c < channels; c++) {
-    clt_transport_row_sums(scene->transport, (int)c, &scene->flood[c * cells]);
     scene->full_drive[c] = 1.0;
   }
   return CLT_OK;

@@ -52,7 +52,8 @@ static void read_grid(clt_section root, clt_scene_description *description) {
   description->width = clt_read_integer(grid, "width", 64, 1, 1024);
   description->height = clt_read_integer(grid, "height", 48, 1, 1024);
   description->channels = clt_read_integer(grid, "channels", 3, 1, 3);
-  description->rays = clt_read_integer(grid, "rays", 8, 1, 16);
+  bool fine = description->width * description->height > CLT_FINE_GRID;
+  description->rays = clt_read_integer(grid, "rays", fine ? 2 : 8, 1, 16);
   if (description->channels == 2) {
     clt_section_fail(grid, "channels", "is 2; legal is 1 or 3");
   }
