@@ -23,7 +23,7 @@ static const refusal refusals[] = {
     {GRID WHITE, "neither surfaces nor transport_file", "needs one of them"},
     {GRID WHITE WALL "transport_file = \"t.h5\";", "transport_file", "beside surfaces"},
     {"grid = { width = 0; }; " WHITE WALL, "scene.cfg:1: width", "legal is 1 to 1024"},
-    {"grid = { width = 81; height = 80; }; " WHITE WALL, "grid", "at most 6400"},
+    {"grid = { width = 1024; height = 577; }; " WHITE WALL, "grid", "at most 589824"},
     {"grid = { channels = 2; }; " WHITE WALL, "channels", "legal is 1 or 3"},
     {GRID "gird = 1; " WHITE WALL, "gird", "not a known key"},
     {GRID "projector = { positon = [0, 0, 0]; }; " WHITE WALL, "positon", "not a known key"},
