@@ -155,6 +155,24 @@ class Analysis(PathTest):
         self.assertAlmostEqual(float(np.median(ratio[:, :12][lit[:, :12]])), 0.5, delta=0.005)
         self.assertAlmostEqual(float(np.median(ratio[:, 12:][lit[:, 12:]])), 1.1, delta=0.01)
 
+    def test_spread_of_a_measured_room_is_flagged(self):
+        """Case 23: subsurface and defocus in the scene, T measured through noisy frames."""
+        wide = 0.159  # a Gaussian of one cell at its middle: what of the spread light stays in its cell
+        cases = (("", None, 0, 2e-3), ("subsurface = { share = 0.3; radius = 1.0; };", None, 0.3, 0.01),
+                 ("subsurface = { share = 0.1; radius = 1.0; };", None, 0.1, 0.005), ("", "defocus = 0.4; ", 0, None))
+        for more, lens, share, within in cases:
+            text = WALLS.format(0.7, 0.7).replace("intensity", (lens or "") + "intensity") + more
+            (self.folder / "walls.cfg").write_text(text)
+            answer_of("acquire", "--scene", self.folder / "walls.cfg", "-o", self.folder / "T.h5", "--scheme", "brute")
+            np.save(self.folder / "full.npy", np.ones((1, 18, 24), "f4"))
+            answer = answer_of("bounces", self.folder / "T.h5", "--drive", self.folder / "full.npy", "-n", 1, "-o",
+                               self.folder / "out")
+            if within is None:
+                self.assertGreater(answer["spread"], 0.2)
+            else:  # of a checkerboard 1 - share stays, of a cell alone 1 - share + share * wide
+                self.assertAlmostEqual(answer["spread"], 1 - (1 - share) / (1 - share + share * wide), delta=within)
+            self.assertEqual((answer["inexact"], bool(answer["why"])), (bool(more or lens),) * 2)
+
     def test_separate_tells_direct_from_global(self):
         scene = self.folder / "walls.cfg"
         scene.write_text(WALLS.format(0.7, 0.7))
