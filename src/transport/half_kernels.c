@@ -82,10 +82,13 @@ static bool runs_everywhere(void) {
 static const clt_half_kernels portable = {.runs_here = runs_everywhere, .dot = dot_portable, .add = add_portable};
 
 #if defined(__x86_64__)
+#include <cpuid.h>
 #include <immintrin.h>
 
+/* Not every compiler's __builtin_cpu_supports knows f16c: it is bit 29 of ecx in CPUID's leaf 1. */
 static bool has_f16c(void) {
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("f16c");
+  unsigned a = 0, b = 0, c = 0, d = 0;
+  return __builtin_cpu_supports("avx2") && __get_cpuid(1, &a, &b, &c, &d) && (c >> 29 & 1u);
 }
 
 #define F16C __attribute__((target("avx2,f16c")))
