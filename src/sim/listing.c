@@ -157,8 +157,10 @@ static bool collect(clt_listing *listing, bench *own) {
   for (int k = 0; k < CLT_LISTS && enough; k++) {
     clt_weights *from = &own->list[k];
     for (int i = 0; i < from->rows && enough; i++) {
-      enough = clt_weights_append(&listing->list[k], &from->element[from->start[i]], &from->weight[from->start[i]],
-                                  from->start[i + 1] - from->start[i]);
+      int count = from->start[i + 1] - from->start[i];
+      const int *element = count > 0 ? &from->element[from->start[i]] : NULL; /* a block of empty rows has no arrays */
+      const double *weight = count > 0 ? &from->weight[from->start[i]] : NULL;
+      enough = clt_weights_append(&listing->list[k], element, weight, count);
     }
     from->rows = 0;
   }
