@@ -55,10 +55,12 @@ typedef struct clt_method {
   clt_outcome (*run)(clt_system *system, clt_run *run);
 } clt_method;
 
-extern const clt_method clt_method_jacobi, clt_method_pcg, clt_method_gmres, clt_method_bounded;
+extern const clt_method clt_method_series, clt_method_jacobi, clt_method_damped, clt_method_chebyshev, clt_method_pcg,
+    clt_method_deflated_pcg, clt_method_gmres, clt_method_lsmr, clt_method_bounded;
 /* those that need the entries of T */
-extern const clt_method clt_method_direct, clt_method_stored_inverse, clt_method_matrix, clt_method_clusters,
-    clt_method_wavelet, clt_method_montecarlo, clt_method_hybrid;
+extern const clt_method clt_method_gauss_seidel, clt_method_sor, clt_method_southwell, clt_method_direct,
+    clt_method_stored_inverse, clt_method_matrix, clt_method_clusters, clt_method_wavelet, clt_method_montecarlo,
+    clt_method_hybrid;
 
 /* Every method, ended by NULL (table.c). */
 extern const clt_method *const clt_methods[];

@@ -1,6 +1,6 @@
 #include <math.h>
 
-#include "solve/method.h"
+#include "solve/pcg.h"
 
 /* For a Lambertian scene S W = M with W = diag(w), w the flux weights and M symmetric positive definite, diag(M) = w.
  * Conjugate gradients for M z = b, l = W z, preconditioned by diag(M), read with z written back as l:
@@ -17,6 +17,7 @@ enum { RECOMPUTE_EVERY = 10, STALE_STEPS = 20, RESTARTS_MAX = 3 };
 
 typedef struct cg {
   clt_system *system;
+  const clt_flat_mode *flat; /* NULL: none is deflated */
   double *r, *p, *q, *inverse_flux, *best;
   double rho, norm, least;
   int since_least, since_true, restarts;
@@ -30,13 +31,40 @@ static double weighted_dot(size_t count, const double *weight, const double *a, 
   return sum;
 }
 
+/* With flat modes z (pcg.h) l starts with their part solved, and p keeps <S z, p> = 0:
+ *
+ *   l += z <z, r> / <z, S z>,  r -= S z <z, r> / <z, S z>        p -= z <S z, r> / <z, S z>
+ *
+ * Where S is self-adjoint <z, r> then stays 0; where it nearly is, what has come back is solved again after a step. */
+static void solve_flat(cg *state) {
+  for (int c = 0; state->flat != NULL && c < state->flat->channels; c++) {
+    size_t count = state->flat->count, at = (size_t)c * count;
+    const double *z = state->flat->z + at, *sz = state->flat->sz + at;
+    double share = state->flat->inverse[c] * weighted_dot(count, state->inverse_flux + at, z, state->r + at);
+    clt_add(count, share, z, state->system->light + at);
+    clt_add(count, -share, sz, state->r + at);
+  }
+}
+
+static void deflate(const cg *state) {
+  for (int c = 0; state->flat != NULL && c < state->flat->channels; c++) {
+    size_t count = state->flat->count, at = (size_t)c * count;
+    const double *sz = state->flat->sz + at;
+    double share = state->flat->inverse[c] * weighted_dot(count, state->inverse_flux + at, sz, state->r + at);
+    clt_add(count, -share, state->flat->z + at, state->p + at);
+  }
+}
+
 /* Starts over from l: r = b - S l, p = r. */
 static void restart(cg *state) {
   clt_system *system = state->system;
-  state->norm = clt_system_residual(system, system->light, state->r);
+  clt_system_residual(system, system->light, state->r);
+  solve_flat(state);
+  state->norm = clt_norm(system->cols, state->r);
   state->rho = weighted_dot(system->cols, state->inverse_flux, state->r, state->r);
   state->since_true = 0;
   clt_copy(system->cols, state->r, state->p);
+  deflate(state);
 }
 
 static void begin(cg *state) {
@@ -66,12 +94,14 @@ static bool iterate(cg *state, clt_run *run) {
   double alpha = state->rho / curvature, before = state->rho;
   clt_add(system->cols, alpha, state->p, system->light);
   clt_add(system->cols, -alpha, state->q, state->r);
+  solve_flat(state);
   state->rho = weighted_dot(system->cols, state->inverse_flux, state->r, state->r);
   state->norm = clt_norm(system->cols, state->r);
   double beta = state->rho / before;
   for (size_t i = 0; i < system->cols; i++) {
     state->p[i] = state->r[i] + beta * state->p[i];
   }
+  deflate(state);
   state->since_true++;
   return true;
 }
@@ -109,8 +139,8 @@ static bool recompute(cg *state, clt_run *run, double target) {
   return true;
 }
 
-static clt_outcome run_pcg(clt_system *system, clt_run *run) {
-  cg state = {.system = system};
+clt_outcome clt_cg_run(clt_system *system, clt_run *run, const clt_flat_mode *flat) {
+  cg state = {.system = system, .flat = flat};
   double target = clt_run_target(run, system);
   clt_outcome outcome = CLT_RUN_CONVERGED;
   begin(&state);
@@ -140,10 +170,14 @@ static clt_outcome run_pcg(clt_system *system, clt_run *run) {
   return rounding ? CLT_RUN_STOPPED : outcome;
 }
 
+static clt_outcome run_pcg(clt_system *system, clt_run *run) {
+  return clt_cg_run(system, run, NULL);
+}
+
 const clt_method clt_method_pcg = {
     .name = "pcg",
     .summary = "conjugate gradients in the flux-weighted inner product; the fastest where the scene is diffuse "
                "(reciprocity defect up to 0.1), at any albedo",
-    .vectors = 5,
+    .vectors = CLT_CG_VECTORS,
     .run = run_pcg,
 };
