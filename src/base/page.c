@@ -32,8 +32,9 @@ static const char style[] =
     "svg{display:block;width:100%;height:auto}svg text{fill:var(--soft);font-size:13px}svg .title{fill:var(--ink)}\n"
     "svg .power{font-size:10px}svg .grid{stroke:var(--line)}svg polyline{fill:none;stroke-width:2.2;"
     "stroke-linejoin:round}.run polyline{stroke:var(--run)}.run circle{fill:var(--run)}\n"
-    ".r0{--run:#7c8798}.r1{--run:#2a9d8f}.r2{--run:#3b82f6}.r3{--run:var(--mark)}"
-    ".r2 polyline{stroke-dasharray:7 5}\n"
+    ".r0{--run:#7c8798}.r1{--run:#2a9d8f}.r2{--run:#3b82f6}.r3{--run:#a855f7}"
+    ".r4{--run:#d4a017}.r5{--run:var(--mark)}"
+    ".r4 polyline{stroke-dasharray:7 5}\n"
     ".scale{max-width:700px;margin:16px auto 0}.curve{max-width:860px}\n"
     "dl{margin:0;max-width:52em}dt{font-weight:600;margin-top:.9em}dd{margin:0;color:var(--soft)}\n"
     "</style></head><body><main>\n";

@@ -16,7 +16,7 @@ typedef struct demo_timings {
 } demo_timings;
 
 /* One method's way to the unbounded or bounded solution of the same target. */
-enum { DEMO_RACE_MAX = 8 };
+enum { DEMO_RACE_MAX = 6 };
 typedef struct demo_race {
   int count;
   clt_solve_result runs[DEMO_RACE_MAX];

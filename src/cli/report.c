@@ -103,12 +103,12 @@ static void put_convergence(FILE *page, const demo *d) {
   clt_page_text(page, solve->reason);
   fputs(".</p>\n", page);
   if (d->race.count > 0) {
-    fputs(
-        "<p class=\"soft\">Every method that takes this transport, on the same target. The bounded one starts from a "
-        "linear "
-        "solution and ends at the limit, as it may not ask for less than no light; the others go below it with drives "
-        "that no projector can show.</p>\n",
-        page);
+    fputs("<p class=\"soft\">The methods that take this transport, of six, on the same target. The bounded one starts "
+          "from a "
+          "linear solution and ends at the limit, as it may not ask for less than no light; the others go below it "
+          "with drives "
+          "that no projector can show.</p>\n",
+          page);
     cli_report_curves(page, d->race.runs, d->race.count);
   }
 }

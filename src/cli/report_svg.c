@@ -69,7 +69,7 @@ static void draw_iterations(FILE *page, const axes *a) {
 }
 
 static void draw_run(FILE *page, const axes *a, const clt_solve_result *run, int index) {
-  fprintf(page, "<g class=\"run r%d\"><polyline points=\"", index % 4);
+  fprintf(page, "<g class=\"run r%d\"><polyline points=\"", index % 6);
   for (size_t i = 0; i < run->curve_count; i++) {
     fprintf(page, "%.1f,%.1f ", at_x(a, (double)i), at_y(a, run->curve[i]));
   }

@@ -34,7 +34,7 @@ typedef struct clt_job {
   clt_run run[CLT_CHANNELS_MAX]; /* of each system, as are the norms */
   double wanted_norm[CLT_CHANNELS_MAX], residual[CLT_CHANNELS_MAX];
   long products[CLT_CHANNELS_MAX];
-  const clt_method *answer;               /* the last method that ran */
+  const clt_method *answer;               /* the first method, or what took over from it in some system */
   const clt_method *broken, *replacement; /* the first that broke, and what took over in the end; NULL where none did */
   char why[CLT_NOTE_MAX];                 /* note of the broken one */
   bool stalled;                           /* a linear method of auto did not reach the tolerance */

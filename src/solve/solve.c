@@ -147,7 +147,9 @@ static clt_status run_method(clt_job *job, const clt_method *method, clt_run *ru
       return status;
     }
     *outcome = method->run(system, run);
-    job->answer = method;
+    if (method != job->solver->method && job->answer != &clt_method_bounded) {
+      job->answer = method; /* what any system needed beyond the first method is told of all */
+    }
     if (!is_finite(system)) {
       clt_run_note(run, "it gave a value that is not finite");
       memset(system->light, 0, system->cols * sizeof(double));

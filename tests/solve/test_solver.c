@@ -303,6 +303,23 @@ static void a_transport_with_nan_is_refused_or_masked(void **state) {
   }
 }
 
+/* Where one channel only needs the bounded solve, the answer tells of it, whichever channel that is. */
+static void what_one_channel_needed_is_told(void **state) {
+  (void)state;
+  for (int dark = 0; dark < 3; dark++) {
+    test_room room = room_make((recipe){.width = 10, .height = 8, .channels = 3, .seed = 4, .albedo = {0.7, 0.7, 0.7}});
+    room_ask(&room, 5, 0.3, 0.7);
+    for (size_t i = 0; i < room.cells; i++) {
+      room.b[(size_t)dark * room.cells + i] *= i % 2 == 0 ? 1.0 : 0.0;
+    }
+    clt_solve_options options = {.tolerance = 1e-6};
+    clt_solve_result result = solve_with(&room, &options, room.b, room.x);
+    assert_string_equal(result.method, "bounded");
+    assert_non_null(strstr(result.reason, "bounded optimum"));
+    room_free(&room);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_solver_is_as_good_as_new),
@@ -312,6 +329,7 @@ int main(void) {
       cmocka_unit_test(a_deadline_leaves_the_best_so_far),
       cmocka_unit_test(bad_input_is_refused_by_every_method),
       cmocka_unit_test(a_transport_with_nan_is_refused_or_masked),
+      cmocka_unit_test(what_one_channel_needed_is_told),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
