@@ -67,6 +67,7 @@ typedef struct clt_solve_result {
   long products;          /* with T or T', the most that any channel took; channels together count as one */
   double residual;        /* ||T x - b|| / ||b|| over lit rows of every channel, of the x that is returned */
   double seconds;         /* wall time of the solve */
+  double method_seconds;  /* of it, in the methods themselves: without the product that `residual` takes */
   double prepare_seconds; /* wall time that making the method ready took, once for every solve with the solver */
   bool converged;         /* false where the iteration limit or the deadline came first */
   size_t curve_count;     /* residual after iteration k, k = 0.. (channels together), for convergence plots */

@@ -31,6 +31,7 @@ typedef struct clt_job {
   clt_solver *solver;
   const double *start; /* channels * cols values, or NULL */
   int64_t start_ns;
+  double method_s;               /* in the methods so far */
   clt_run run[CLT_CHANNELS_MAX]; /* of each system, as are the norms */
   double wanted_norm[CLT_CHANNELS_MAX], residual[CLT_CHANNELS_MAX];
   long products[CLT_CHANNELS_MAX];

@@ -146,7 +146,9 @@ static clt_status run_method(clt_job *job, const clt_method *method, clt_run *ru
     if (status != CLT_OK) {
       return status;
     }
+    int64_t start_ns = clt_clock_ns();
     *outcome = method->run(system, run);
+    job->method_s += clt_clock_since(start_ns);
     if (method != job->solver->method && job->answer != &clt_method_bounded) {
       job->answer = method; /* what any system needed beyond the first method is told of all */
     }

@@ -68,8 +68,10 @@ static void tell_reason(const clt_job *job, clt_solve_result *result) {
 
 void clt_job_tell(const clt_job *job, bool converged, clt_solve_result *result) {
   double wanted_norm = norm_of(job->wanted_norm, job->solver->systems);
-  *result = (clt_solve_result){
-      .converged = converged, .seconds = clt_clock_since(job->start_ns), .prepare_seconds = job->solver->prepare_s};
+  *result = (clt_solve_result){.converged = converged,
+                               .seconds = clt_clock_since(job->start_ns),
+                               .method_seconds = job->method_s,
+                               .prepare_seconds = job->solver->prepare_s};
   double residual = norm_of(job->residual, job->solver->systems);
   result->residual = wanted_norm > 0 ? residual / wanted_norm : 0;
   for (int c = 0; c < job->solver->systems; c++) {

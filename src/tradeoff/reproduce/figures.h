@@ -16,7 +16,7 @@ typedef struct clt_figure {
 } clt_figure;
 
 extern const clt_figure clt_figure_coefficients, clt_figure_cornell, clt_figure_convergence, clt_figure_scenes,
-    clt_figure_ladder, clt_figure_paths, clt_figure_bounces;
+    clt_figure_ladder, clt_figure_bounces;
 
 /* Adds a row; the text of ours is formatted. */
 void clt_reproduced_add(clt_reproduction *out, const char *name, const char *report, bool pass, const char *format, ...)

@@ -8,7 +8,8 @@
 #include "tradeoff/reproduce/figures.h"
 #include "tradeoff/reproduce/page.h"
 
-static const clt_figure *const figures[] = {&clt_figure_coefficients, &clt_figure_cornell, &clt_figure_convergence};
+static const clt_figure *const figures[] = {&clt_figure_coefficients, &clt_figure_cornell, &clt_figure_convergence,
+                                            &clt_figure_scenes,       &clt_figure_ladder,  &clt_figure_bounces};
 enum { FIGURES = sizeof figures / sizeof figures[0] };
 
 void clt_reproduced_add(clt_reproduction *out, const char *name, const char *report, bool pass, const char *format,
