@@ -94,6 +94,7 @@ clt_status clt_hdf_create(const char *path, const char *label, clt_hdf *hdf, clt
   }
   hdf->file = clt_sink_create(&hdf->sink, label);
   if (hdf->file < 0) {
+    clt_sink_finish(&hdf->sink);
     close(hdf->sink.descriptor);
     return clt_hdf_refuse_write(hdf, "the file", error);
   }
@@ -112,6 +113,7 @@ clt_status clt_hdf_complete(clt_hdf *hdf, clt_status status, clt_error *error) {
     status = clt_hdf_refuse_write(hdf, "the end of the file", error);
   }
   hdf->file = H5I_INVALID_HID;
+  clt_sink_finish(&hdf->sink);
   if (close(hdf->sink.descriptor) != 0 && hdf->sink.failure == 0) {
     hdf->sink.failure = errno;
   }

@@ -128,7 +128,7 @@ static const H5FD_class_t sink_class = {.name = "counterlight sink",
 /* The format of HDF5 1.8 has check sums over a file's structure, which the older one, HDF5's default, has not. */
 hid_t clt_sink_create(clt_sink *sink, const char *name) {
   const sink_target target = {sink};
-  hid_t driver = H5FDregister(&sink_class);
+  hid_t driver = sink->driver = H5FDregister(&sink_class);
   hid_t access = H5Pcreate(H5P_FILE_ACCESS);
   hid_t file = H5I_INVALID_HID;
   if (driver >= 0 && access >= 0 && H5Pset_driver(access, driver, &target) >= 0 &&
@@ -138,8 +138,12 @@ hid_t clt_sink_create(clt_sink *sink, const char *name) {
   if (access >= 0) {
     H5Pclose(access);
   }
-  if (driver >= 0) {
-    H5FDunregister(driver);
-  }
   return file;
+}
+
+void clt_sink_finish(clt_sink *sink) {
+  if (sink->driver >= 0) {
+    H5FDunregister(sink->driver);
+  }
+  sink->driver = H5I_INVALID_HID;
 }
