@@ -193,7 +193,9 @@ static void mistakes_are_refused(void **state) {
 /* A scene file names the mesh relative to itself, and says where a wrong one is. */
 static void scene_files_name_meshes(void **state) {
   (void)state;
-  free(read_cube(CLT_FACING_OUT)); /* skips where meshes are not read */
+  clt_scene_description *cube = read_cube(CLT_FACING_OUT); /* skips where meshes are not read */
+  clt_scene_description_finish(cube);
+  free(cube);
   room made;
   room_make(&made, "grid = { width = 4; height = 3; }; materials = ( { name = \"m\"; } );\n"
                    "surfaces = (\n{ type = \"mesh\"; file = \"absent.obj\"; material = \"m\"; } );");
