@@ -5,6 +5,7 @@
 #include <stdbool.h>
 
 #include "counterlight/rig.h"
+#include "counterlight/solve.h"
 #include "counterlight/status.h"
 #include "counterlight/transport.h"
 
@@ -22,6 +23,9 @@ typedef struct clt_acquire_options {
   const char *scheme; /* "brute", "hierarchical" or "auto" (NULL: auto) */
   double threshold;   /* hierarchical: tau, the fraction of a cell's light under the flood below which the light of a
                          block that cannot be predicted is not resolved further; 0..0.5, 0 means 0.005 */
+  double error;       /* wanted: relative RMS of the appearance of a picture, 0..0.5; 0 means 0.01. "blocks" stops where
+                         it is reached, "auto" chooses by it */
+  double seconds;     /* allowed, > 0, or 0 for any time: "blocks" stops there, "auto" chooses by it */
   int repeats;        /* observations averaged for black and flood, 1..256; 0 means 8, with "brute" N / 32 if more */
   int checks;         /* random check patterns observed at the end for provenance.error, 0..64 */
   unsigned seed;      /* of the check patterns */
@@ -36,6 +40,39 @@ typedef struct clt_acquire_options {
  * provenance is filled. */
 CLT_PUBLIC clt_status clt_acquire(clt_rig *rig, const clt_acquire_options *options, clt_transport **out,
                                   clt_error *error);
+
+/* Compensating one picture through the rig, without a transport. */
+typedef struct clt_optical_options {
+  double tolerance; /* relative residual over the cells free to follow, to stop at, below 1; 0 means 0.005. It also
+                       stops where only the noise of a photograph is left */
+  int photographs;  /* at most, all counted, 4..1000; 0 means 40 */
+  clt_white white;  /* AUTO or VALUE; FEASIBLE needs a transport and is refused */
+  bool (*progress)(void *context, const clt_progress *progress); /* as for clt_acquire; may be NULL */
+  void *context;
+} clt_optical_options;
+
+enum { CLT_OPTICAL_CURVE_MAX = 64 };
+/* Errors are relative RMS over lit cells, ||y - target|| / ||target||, as photographed. */
+typedef struct clt_optical_result {
+  int photographs, frames;        /* that it took: black, chessboard and its inverse, and one a step */
+  double white[CLT_CHANNELS_MAX]; /* radiance that 1.0 in the picture stands for */
+  double error_before;            /* drive = picture, after the best single brightness factor */
+  double error_after;             /* of the drive that is returned, less the noise of its photograph */
+  double noise;                   /* of one photograph, relative to the target */
+  double clipped_fraction;        /* lit cells whose drive is at 0 or 1 */
+  double seconds;                 /* wall time */
+  bool converged;                 /* false where the photographs were used up first */
+  char reason[96];                /* why it stopped */
+  size_t curve_count;
+  double curve[CLT_OPTICAL_CURVE_MAX]; /* ||y - target|| / ||target|| of each step's photograph */
+} clt_optical_result;
+
+/* The drive in 0..1 that makes `picture` (linear, the rig's grid and channels, values >= 0) appear, found by
+ * photographs alone: T x is what the camera sees (O'Toole and Kutulakos 2010). Every photograph is of a drive in 0..1,
+ * none is of a signed pattern. drive, the best that was photographed, is initialised here. Where a cell cannot reach
+ * its target it stands at its bound, and the others reach theirs: not quite the least squares of "bounded". */
+CLT_PUBLIC clt_status clt_optical_compensate(clt_rig *rig, const clt_image *picture, const clt_optical_options *options,
+                                             clt_image *drive, clt_optical_result *result, clt_error *error);
 
 #ifdef __cplusplus
 }

@@ -81,3 +81,9 @@ clt_status clt_session_average(clt_session *session, const char *phase, clt_imag
   }
   return CLT_OK;
 }
+
+bool clt_session_may_go_on(const clt_session *session) {
+  const clt_progress *progress = &session->progress;
+  const double allowed = session->options.seconds, each = progress->seconds / (double)progress->done;
+  return !(allowed > 0) || progress->seconds + (1 + session->options.checks) * each <= allowed;
+}

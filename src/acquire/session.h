@@ -26,7 +26,7 @@ typedef struct clt_scheme {
   clt_status (*measure)(clt_session *session, clt_transport **out, clt_error *error);
 } clt_scheme;
 enum { CLT_REPEATS_DEFAULT = 8, CLT_REPEATS_MAX = 256 };
-extern const clt_scheme clt_scheme_brute, clt_scheme_hierarchical;
+extern const clt_scheme clt_scheme_brute, clt_scheme_hierarchical, clt_scheme_blocks;
 
 clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquire_options *options, clt_error *error);
 void clt_session_finish(clt_session *session); /* accepts a half-built one */
@@ -40,5 +40,13 @@ clt_status clt_session_observe(clt_session *session, const char *phase, clt_erro
  * (infinite where none was valid; the mean is then the last bound seen). */
 clt_status clt_session_average(clt_session *session, const char *phase, clt_image *mean, clt_image *variance,
                                clt_error *error);
+
+/* False where another pattern would probably end after the seconds allowed. */
+bool clt_session_may_go_on(const clt_session *session);
+/* ||b0 + T x - y|| / ||y|| of the last observation y of the drive x, less what its noise adds. */
+clt_status clt_session_miss(const clt_session *session, const clt_transport *transport, double *relative,
+                            clt_error *error);
+/* Observes options.checks random pictures: the same of all together, < 0 where there is none. */
+clt_status clt_session_check(clt_session *session, const clt_transport *transport, double *relative, clt_error *error);
 
 #endif
