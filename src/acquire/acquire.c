@@ -18,7 +18,8 @@ enum { CHECKS_MAX = 64 };
 /* Up to here one photograph per cell is as quick as anything cleverer. */
 enum { BRUTE_CELLS_MAX = 64 };
 
-static const clt_scheme *const schemes[] = {&clt_scheme_brute, &clt_scheme_hierarchical, &clt_scheme_blocks};
+static const clt_scheme *const schemes[] = {&clt_scheme_brute, &clt_scheme_hadamard, &clt_scheme_hierarchical,
+                                            &clt_scheme_blocks};
 enum { SCHEMES = sizeof schemes / sizeof schemes[0] };
 
 static clt_status check_options(const clt_acquire_options *options, clt_acquire_options *checked, clt_error *error) {

@@ -16,9 +16,10 @@
 #include "acquire/session.h"
 #include "base/memory.h"
 
-enum { KEPT = 12, PHOTOGRAPHS_DEFAULT = 40, PHOTOGRAPHS_MAX = 1000, PREPARING = 3 };
+enum { KEPT = 12, PHOTOGRAPHS_DEFAULT = 40, PHOTOGRAPHS_MAX = 1000, PREPARING = 3, PATIENCE = 2 };
 #define TOLERANCE_DEFAULT 0.005
-#define SAFETY 1.05 /* discrepancy principle: stop at this many times the noise */
+#define SAFETY 1.05  /* discrepancy principle: stop at this many times the noise */
+#define STALLED 0.96 /* of the best squared residual: more than that is no progress */
 #define DARK_SHARE 1e-3
 #define DARK_SIGMAS 5.0
 #define RIDGE 1e-9 /* of the trace: pairs that hardly differ */
@@ -283,42 +284,48 @@ static void start_drive(optical *own, const clt_image *picture, bool flood) {
   }
 }
 
-static void note(clt_optical_result *result, const optical *own, const norms *found, bool converged) {
-  const double noise = SAFETY * sqrt(found->free_noise / found->target);
-  result->converged = converged;
-  result->noise = sqrt(found->noise / found->target);
-  snprintf(result->reason, sizeof result->reason, "%s",
-           !converged               ? "the photographs allowed are used up"
-           : noise > own->tolerance ? "what is left is the noise of a photograph"
-                                    : "the wanted tolerance is reached");
+/* Why to stop after a photograph, or NULL. The residual's noise is no error of the drive. */
+static const char *why_stop(const optical *own, const norms *found, int stalled) {
+  const double wanted = own->tolerance * own->tolerance * found->target;
+  if (found->free - found->free_noise <= wanted) {
+    return "the wanted tolerance is reached";
+  }
+  if (found->free <= SAFETY * SAFETY * found->free_noise) {
+    return "what is left is the noise of a photograph";
+  }
+  return stalled > PATIENCE ? "further photographs do not come nearer" : NULL;
 }
 
+/* Photographs drive after drive until there is a reason to stop. */
 static clt_status iterate(optical *own, const clt_image *picture, clt_optical_result *result, clt_error *error) {
-  clt_status status = CLT_OK;
   norms found = {0}, best = {0};
-  bool converged = false;
-  for (int k = 0; status == CLT_OK && !converged && own->session.progress.done < own->limit; k++) {
+  const char *reason = NULL;
+  int stalled = 0;
+  for (int k = 0; reason == NULL && own->session.progress.done < own->limit; k++) {
+    const double before = own->best_norm;
     if (k < 2) {
       start_drive(own, picture, k == 1);
     } else {
       next_drive(own);
     }
-    status = photograph(own, &found, error);
+    clt_status status = photograph(own, &found, error);
     if (status != CLT_OK) {
-      break;
+      return status;
     }
     result->error_before = k == 0 ? error_before(own) : result->error_before;
-    best = own->best_norm == found.residual ? found : best;
+    best = own->best_norm < before ? found : best;
+    stalled = own->best_norm < STALLED * before ? 0 : stalled + 1;
     if (result->curve_count < CLT_OPTICAL_CURVE_MAX) {
       result->curve[result->curve_count++] = found.target > 0 ? sqrt(found.residual / found.target) : 0;
     }
-    converged = found.free <= fmax(own->tolerance * own->tolerance * found.target, SAFETY * SAFETY * found.free_noise);
+    reason = k > 0 ? why_stop(own, &found, stalled) : NULL;
   }
-  if (status == CLT_OK) {
-    result->error_after = best.target > 0 ? sqrt(fmax(best.residual - best.noise, 0) / best.target) : 0;
-    note(result, own, &found, converged);
-  }
-  return status;
+  result->converged = reason != NULL;
+  result->noise = best.target > 0 ? sqrt(best.noise / best.target) : 0;
+  result->error_after = best.target > 0 ? sqrt(fmax(best.residual - best.noise, 0) / best.target) : 0;
+  snprintf(result->reason, sizeof result->reason, "%s",
+           reason != NULL ? reason : "the photographs allowed are used up");
+  return CLT_OK;
 }
 
 static void describe(const optical *own, clt_optical_result *result) {

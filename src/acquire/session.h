@@ -26,7 +26,7 @@ typedef struct clt_scheme {
   clt_status (*measure)(clt_session *session, clt_transport **out, clt_error *error);
 } clt_scheme;
 enum { CLT_REPEATS_DEFAULT = 8, CLT_REPEATS_MAX = 256 };
-extern const clt_scheme clt_scheme_brute, clt_scheme_hierarchical, clt_scheme_blocks;
+extern const clt_scheme clt_scheme_brute, clt_scheme_hadamard, clt_scheme_hierarchical, clt_scheme_blocks;
 
 clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquire_options *options, clt_error *error);
 void clt_session_finish(clt_session *session); /* accepts a half-built one */

@@ -8,7 +8,7 @@
 #include "counterlight/transport.h"
 #include "rig/merge.h"
 
-static const char *const scheme_names[] = {"auto", "brute", "hierarchical", "blocks", NULL};
+static const char *const scheme_names[] = {"auto", "brute", "hadamard", "hierarchical", "blocks", NULL};
 #define SIMULATED "simulated"
 #define MS 1e-3
 
