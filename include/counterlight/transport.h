@@ -25,6 +25,7 @@ enum { CLT_GRID_SIDE_MAX = 16384, CLT_CHANNELS_MAX = 4, CLT_TEXT_MAX = 128 };
 /* Where a transport comes from; all fields are optional and travel in the file's root attributes. */
 typedef struct clt_provenance {
   char scheme[CLT_TEXT_MAX];   /* how it was acquired: "brute", "hierarchical", ...; empty: not known */
+  char plan[CLT_TEXT_MAX];     /* which scheme was taken and why, in one sentence */
   char source[CLT_TEXT_MAX];   /* the rig or scene it was measured on */
   char response[CLT_TEXT_MAX]; /* the projector's response curve, as clt_curve_parse reads it; empty: sRGB */
   int64_t acquired;            /* seconds since 1970-01-01 UTC; 0: not known */

@@ -6,21 +6,16 @@
 #include <string.h>
 #include <time.h>
 
+#include "acquire/choose.h"
 #include "acquire/session.h"
 #include "base/clock.h"
 #include "base/memory.h"
 
 #define THRESHOLD_DEFAULT 0.005
 #define THRESHOLD_MAX 0.5
-#define ERROR_DEFAULT 0.01
+#define ERROR_DEFAULT 0.005
 #define ERROR_MAX 0.5
 enum { CHECKS_MAX = 64 };
-/* Up to here one photograph per cell is as quick as anything cleverer. */
-enum { BRUTE_CELLS_MAX = 64 };
-
-static const clt_scheme *const schemes[] = {&clt_scheme_brute, &clt_scheme_hadamard, &clt_scheme_hierarchical,
-                                            &clt_scheme_blocks};
-enum { SCHEMES = sizeof schemes / sizeof schemes[0] };
 
 static clt_status check_options(const clt_acquire_options *options, clt_acquire_options *checked, clt_error *error) {
   *checked = *options;
@@ -44,23 +39,6 @@ static clt_status check_options(const clt_acquire_options *options, clt_acquire_
   checked->error = options->error > 0 ? options->error : ERROR_DEFAULT;
   checked->threshold = options->threshold > 0 ? options->threshold : THRESHOLD_DEFAULT;
   return CLT_OK;
-}
-
-static clt_status find_scheme(const char *name, size_t cells, const clt_scheme **out, clt_error *error) {
-  if (name == NULL || strcmp(name, "auto") == 0) {
-    *out = cells <= BRUTE_CELLS_MAX ? &clt_scheme_brute : &clt_scheme_hierarchical;
-    return CLT_OK;
-  }
-  char names[96] = "auto";
-  for (size_t i = 0; i < SCHEMES; i++) {
-    if (strcmp(schemes[i]->name, name) == 0) {
-      *out = schemes[i];
-      return CLT_OK;
-    }
-    size_t used = strlen(names);
-    snprintf(names + used, sizeof names - used, ", %s", schemes[i]->name);
-  }
-  return clt_fail(error, CLT_BAD_INPUT, "\"%.40s\" is no acquisition scheme; there are %s", name, names);
 }
 
 static clt_status measure_black_and_flood(clt_session *session, clt_error *error) {
@@ -99,6 +77,7 @@ static void write_provenance(const clt_session *session, const clt_scheme *schem
                              .frames = (int)(now.frames - session->info.frames),
                              .seconds = clt_clock_since(session->started_ns),
                              .error = error};
+  snprintf(origin->plan, sizeof origin->plan, "%s", session->plan);
   snprintf(origin->scheme, sizeof origin->scheme, "%s", scheme->name);
   snprintf(origin->source, sizeof origin->source, "%s", now.source != NULL ? now.source : "");
   snprintf(origin->response, sizeof origin->response, "%s", now.response != NULL ? now.response : "");
@@ -106,7 +85,8 @@ static void write_provenance(const clt_session *session, const clt_scheme *schem
 
 static clt_status acquire(clt_session *session, const clt_scheme *scheme, clt_transport **out, clt_error *error) {
   const clt_acquire_options *options = &session->options;
-  session->progress.total = 2L * options->repeats + scheme->patterns(session) + options->checks;
+  session->progress.total =
+      session->progress.done + 2L * options->repeats + scheme->patterns(session) + options->checks;
   clt_transport *transport = NULL;
   double relative = -1;
   clt_status status = measure_black_and_flood(session, error);
@@ -139,7 +119,7 @@ clt_status clt_acquire(clt_rig *rig, const clt_acquire_options *options, clt_tra
   const clt_scheme *scheme = NULL;
   status = clt_session_init(&session, rig, &checked, error);
   if (status == CLT_OK) {
-    status = find_scheme(checked.scheme, session.cells, &scheme, error);
+    status = clt_choose_scheme(&session, &scheme, error);
   }
   if (status == CLT_OK) {
     session.options.repeats = checked.repeats > 0 ? checked.repeats : scheme->repeats(session.cells);

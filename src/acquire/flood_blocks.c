@@ -6,7 +6,7 @@
  * seen unevenly in another. Blocks are cut in two where that part is expected to be largest; the second half is what
  * the first leaves of the whole, so that a cut takes one photograph, and all columns add up to the flood.
  *
- * Test pictures that light half of every block show directly what the blocks do not resolve. */
+ * Test pictures that light a quarter of every block show directly what the blocks do not resolve. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,9 +22,9 @@ enum { BLOCKS_MAX = 256, REPEATS = 4, FIRST_TEST = 8 };
 /* A cell is dark where its own light is below this part of the brightest, or below this many deviations. */
 #define DARK_SHARE 1e-3
 #define DARK_SIGMAS 4.0
-/* What a picture is off by, as part of a test picture that lights exactly half of every block: figures in
+/* What a picture is off by, as part of what a test picture is that lights a quarter of every block: figures in
  * docs/acquisition.md. */
-#define TEST_SHARE 0.4
+#define TEST_SHARE 0.7
 
 typedef struct flood_blocks {
   clt_session *session;
@@ -45,11 +45,16 @@ static int repeats_of_black(size_t cells) {
   return REPEATS;
 }
 
-/* Blocks that the wanted error takes on diffuse rooms, from docs/acquisition.md. */
+/* The wanted error, above a floor of noise. */
+static double expected_error(const clt_session *session) {
+  return fmax(session->options.error, 0.006);
+}
+
+/* In diffuse rooms an error of .02 takes 20 blocks, and half of it four times as many (docs/acquisition.md). */
 static long count_patterns(const clt_session *session) {
-  const double blocks = 0.5 / session->options.error;
-  const long most = session->cells < BLOCKS_MAX ? (long)session->cells : BLOCKS_MAX;
-  return CLT_SCAN_PATTERNS + (blocks < (double)most ? lrint(blocks) : most) + 4;
+  const double finer = 0.02 / expected_error(session), blocks = 20 * fmax(finer * finer, 0.4);
+  const double most = session->cells < BLOCKS_MAX ? (double)session->cells : BLOCKS_MAX;
+  return CLT_SCAN_PATTERNS + lrint(fmin(blocks, most)) + 1 + lrint(log(fmin(blocks, most) / FIRST_TEST + 1) / log(1.5));
 }
 
 static clt_status init(flood_blocks *own, clt_session *session, clt_error *error) {
@@ -224,24 +229,29 @@ static clt_status make_transport(flood_blocks *own, clt_transport **out, clt_err
   return status;
 }
 
-/* Lights the half of every block that a hash of its number chooses: right, left, lower or upper. */
-static void light_halves(flood_blocks *own) {
+/* Whether a place lies in the wanted half of a side; a side of one cell has no halves. */
+static bool in_half(int place, int side, bool second) {
+  return side == 1 || (2 * place >= side) == second;
+}
+
+/* Lights the quarter of every block that a hash of its number chooses: uneven across and down. */
+static void light_quarters(flood_blocks *own) {
   clt_image *drive = &own->session->drive;
   for (size_t at = 0; at < own->cells * (size_t)own->channels; at++) {
-    const size_t cell = at % own->cells;
+    const int cell = (int)(at % own->cells);
     const int32_t b = own->partition.label[cell];
     const clt_block box = own->partition.box[b];
     const unsigned hash = ((unsigned)b * 2654435761u + (unsigned)own->partition.count * 40503u) >> 13;
-    const bool right = 2 * ((int)(cell % (size_t)drive->width) - box.x) >= box.width;
-    const bool lower = 2 * ((int)(cell / (size_t)drive->width) - box.y) >= box.height;
-    drive->data[at] = (hash & 1 ? right : lower) == ((hash & 2) != 0) ? 1 : 0;
+    const bool lit = in_half(cell % drive->width - box.x, box.width, (hash & 1) != 0) &&
+                     in_half(cell / drive->width - box.y, box.height, (hash & 2) != 0);
+    drive->data[at] = lit ? 1 : 0;
   }
 }
 
 /* Relative RMS of what the model misses of a picture that is uneven in every block. */
-static clt_status test_halves(flood_blocks *own, double *relative, clt_error *error) {
+static clt_status test_quarters(flood_blocks *own, double *relative, clt_error *error) {
   clt_transport *transport = NULL;
-  light_halves(own);
+  light_quarters(own);
   clt_status status = clt_session_observe(own->session, "test", error);
   if (status == CLT_OK) {
     status = make_transport(own, &transport, error);
@@ -268,7 +278,7 @@ static clt_status refine(flood_blocks *own, clt_error *error) {
     status = cut_block(own, block, down, error);
     if (status == CLT_OK && own->partition.count == next_test) {
       next_test += next_test / 2;
-      status = test_halves(own, &missing, error);
+      status = test_quarters(own, &missing, error);
     }
     if (status == CLT_OK && TEST_SHARE * missing <= options->error) {
       break;
@@ -320,4 +330,4 @@ static clt_status measure_blocks(clt_session *session, clt_transport **out, clt_
   return CLT_OK;
 }
 
-const clt_scheme clt_scheme_blocks = {"blocks", repeats_of_black, count_patterns, measure_blocks};
+const clt_scheme clt_scheme_blocks = {"blocks", repeats_of_black, count_patterns, expected_error, measure_blocks};

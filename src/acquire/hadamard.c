@@ -129,4 +129,9 @@ static clt_status measure_hadamard(clt_session *session, clt_transport **out, cl
   return CLT_OK;
 }
 
-const clt_scheme clt_scheme_hadamard = {"hadamard", repeats_of_black, count_patterns, measure_hadamard};
+/* None where the grid is too large. */
+static double expected_error(const clt_session *session) {
+  return session->cells <= CELLS_MAX ? 0.004 : INFINITY;
+}
+
+const clt_scheme clt_scheme_hadamard = {"hadamard", repeats_of_black, count_patterns, expected_error, measure_hadamard};

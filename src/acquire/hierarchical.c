@@ -321,4 +321,10 @@ static long guess_patterns(const clt_session *session) {
   return 40L * (pyramid.levels - 1);
 }
 
-const clt_scheme clt_scheme_hierarchical = {"hierarchical", repeats_by_default, guess_patterns, measure_hierarchical};
+/* In proportion to tau over a floor of noise (docs/configuration.md). */
+static double expected_error(const clt_session *session) {
+  return 0.002 + 0.3 * session->options.threshold;
+}
+
+const clt_scheme clt_scheme_hierarchical = {"hierarchical", repeats_by_default, guess_patterns, expected_error,
+                                            measure_hierarchical};

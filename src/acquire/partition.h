@@ -14,8 +14,8 @@ typedef struct clt_partition {
   int32_t count, most; /* blocks now, and how many there is room for */
   clt_block *box;
   int32_t *label; /* of each cell: its block */
-  /* The light of block a as seen in block b, [b * most + a]: its mean, and half the difference between its means over
-   * the block's right and left, and lower and upper halves; all channels together. */
+  /* The light of block a as seen in block b, [b * most + a]: its mean, and the variance of its means over four strips
+   * from left to right, and from top to bottom; all channels together. */
   double *mean, *across, *down;
   double *variance; /* of one value of a's light, [a] */
 } clt_partition;

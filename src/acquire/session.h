@@ -2,6 +2,7 @@
 #ifndef CLT_ACQUIRE_SESSION_H
 #define CLT_ACQUIRE_SESSION_H
 
+#include "acquire/journal.h"
 #include "counterlight/acquire.h"
 
 typedef struct clt_session {
@@ -14,6 +15,8 @@ typedef struct clt_session {
   clt_image black, black_variance; /* the mean of the repeats and the variance of that mean */
   clt_image flood, flood_variance; /* likewise, the black subtracted; an infinite variance: not seen in any repeat */
   clt_progress progress;
+  clt_journal journal;
+  char plan[CLT_TEXT_MAX]; /* the scheme, and why this one */
   int64_t started_ns;
 } clt_session;
 
@@ -22,6 +25,7 @@ typedef struct clt_scheme {
   const char *name;
   int (*repeats)(size_t cells);                 /* of black and flood where the options leave it open */
   long (*patterns)(const clt_session *session); /* expected number, without black, flood and checks */
+  double (*error)(const clt_session *session);  /* expected relative RMS of an appearance */
   /* Measures a transport with black and flood already in the session; rows sum to the flood; sigma is kept. */
   clt_status (*measure)(clt_session *session, clt_transport **out, clt_error *error);
 } clt_scheme;

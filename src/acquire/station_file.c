@@ -57,6 +57,8 @@ static void read_acquire(clt_section section, clt_station_config *config) {
   clt_acquire_options *acquire = &config->acquire;
   copy_text(config->scheme, sizeof config->scheme, scheme_names[clt_read_choice(section, "scheme", 0, scheme_names)]);
   acquire->threshold = clt_read_number(section, "threshold", 0, 0, 0.5);
+  acquire->error = clt_read_number(section, "error", 0, 0, 0.5);
+  acquire->seconds = clt_read_number(section, "seconds", 0, 0, 1e9);
   acquire->repeats = clt_read_integer(section, "repeats", 0, 1, 256);
   acquire->checks = clt_read_integer(section, "checks", 2, 0, 64);
   acquire->seed = (unsigned)clt_read_integer(section, "seed", 0, 0, 1000000000);
