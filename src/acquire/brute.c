@@ -125,4 +125,4 @@ static double expected_error(const clt_session *session) {
   return 0.003;
 }
 
-const clt_scheme clt_scheme_brute = {"brute", repeats_of_black, count_columns, expected_error, measure_brute};
+const clt_scheme clt_scheme_brute = {"brute", repeats_of_black, count_columns, expected_error, false, measure_brute};

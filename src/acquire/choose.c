@@ -23,13 +23,16 @@ static forecast forecast_scheme(const clt_session *session, const clt_scheme *sc
 }
 
 /* Of two that reach the wanted error the one of fewer patterns, else the one of less error; one that time allows before
- * one that it does not. */
+ * one that it does not; of those the one that stops in time. */
 static bool is_better(const clt_session *session, const forecast *a, const forecast *b) {
   const double wanted = session->options.error, allowed = session->options.seconds;
   const bool a_fits = !(allowed > 0) || a->seconds <= allowed, b_fits = !(allowed > 0) || b->seconds <= allowed;
   const bool a_reaches = a->error <= wanted, b_reaches = b->error <= wanted;
   if (a_fits != b_fits) {
     return a_fits;
+  }
+  if (!a_fits && a->scheme->stops != b->scheme->stops) {
+    return a->scheme->stops;
   }
   if (!a_fits || (a_reaches && b_reaches)) {
     return a->patterns < b->patterns;
@@ -45,7 +48,9 @@ static void write_plan(clt_session *session, const forecast *chosen) {
   }
   snprintf(session->plan, sizeof session->plan, "%s: about %ld patterns%s; %.2g %% expected, %.2g %% wanted%s",
            chosen->scheme->name, chosen->patterns, time, 100 * chosen->error, 100 * wanted,
-           allowed > 0 && chosen->seconds > allowed ? "; too long" : "");
+           !(allowed > 0 && chosen->seconds > allowed) ? ""
+           : chosen->scheme->stops                     ? "; stops at that time"
+                                                       : "; too long");
 }
 
 /* Seconds that a pattern takes. */

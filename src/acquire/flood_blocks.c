@@ -330,4 +330,4 @@ static clt_status measure_blocks(clt_session *session, clt_transport **out, clt_
   return CLT_OK;
 }
 
-const clt_scheme clt_scheme_blocks = {"blocks", repeats_of_black, count_patterns, expected_error, measure_blocks};
+const clt_scheme clt_scheme_blocks = {"blocks", repeats_of_black, count_patterns, expected_error, true, measure_blocks};

@@ -134,4 +134,5 @@ static double expected_error(const clt_session *session) {
   return session->cells <= CELLS_MAX ? 0.004 : INFINITY;
 }
 
-const clt_scheme clt_scheme_hadamard = {"hadamard", repeats_of_black, count_patterns, expected_error, measure_hadamard};
+const clt_scheme clt_scheme_hadamard = {"hadamard", repeats_of_black, count_patterns, expected_error,
+                                        false,      measure_hadamard};

@@ -340,5 +340,5 @@ static double expected_error(const clt_session *session) {
   return 0.002 + 0.3 * session->options.threshold;
 }
 
-const clt_scheme clt_scheme_hierarchical = {"hierarchical", repeats_by_default, guess_patterns, expected_error,
-                                            measure_hierarchical};
+const clt_scheme clt_scheme_hierarchical = {"hierarchical", repeats_by_default,  guess_patterns, expected_error,
+                                            false,          measure_hierarchical};

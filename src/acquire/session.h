@@ -26,6 +26,7 @@ typedef struct clt_scheme {
   int (*repeats)(size_t cells);                 /* of black and flood where the options leave it open */
   long (*patterns)(const clt_session *session); /* expected number, without black, flood and checks */
   double (*error)(const clt_session *session);  /* expected relative RMS of an appearance */
+  bool stops;                                   /* where the seconds allowed are over, with what it has */
   /* Measures a transport with black and flood already in the session; rows sum to the flood; sigma is kept. */
   clt_status (*measure)(clt_session *session, clt_transport **out, clt_error *error);
 } clt_scheme;
