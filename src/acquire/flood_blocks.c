@@ -272,7 +272,7 @@ static clt_status refine(flood_blocks *own, clt_error *error) {
     int32_t block = 0;
     bool down = false;
     double missing = INFINITY;
-    if (!(clt_partition_choose(&own->partition, &block, &down, NULL) > 0)) {
+    if (!(clt_partition_choose(&own->partition, &block, &down) > 0)) {
       break;
     }
     status = cut_block(own, block, down, error);

@@ -103,15 +103,14 @@ static double unresolved(const clt_partition *partition, int32_t b, int32_t a, b
   return other > 0 ? own * (mean > 0 ? fmin(other / (mean * mean), 1) : 1) * (double)box.width * box.height : 0;
 }
 
-double clt_partition_choose(const clt_partition *partition, int32_t *block, bool *down, double *whole) {
-  double best = 0, all = 0;
+double clt_partition_choose(const clt_partition *partition, int32_t *block, bool *down) {
+  double best = 0;
   for (int32_t b = 0; b < partition->count; b++) {
     for (int way = 0; way < 2; way++) {
       double sum = 0;
       for (int32_t a = 0; a < partition->count; a++) {
         sum += unresolved(partition, b, a, way == 1);
       }
-      all += sum;
       if (sum > best && (way == 1 ? partition->box[b].height : partition->box[b].width) > 1) {
         best = sum;
         *block = b;
@@ -120,9 +119,6 @@ double clt_partition_choose(const clt_partition *partition, int32_t *block, bool
     }
   }
   const double cells = (double)partition->width * partition->height;
-  if (whole != NULL) {
-    *whole = sqrt(all / cells);
-  }
   return sqrt(best / cells);
 }
 

@@ -29,9 +29,8 @@ void clt_partition_finish(clt_partition *partition); /* accepts a zeroed one */
 void clt_partition_look(clt_partition *partition, int32_t b, int32_t a, const float *light);
 
 /* The cut that promises most: block and direction (down: into an upper and a lower half). Returns the rms over the grid
- * of the light that it lets be resolved, or 0 where no cut promises more than noise. `whole`, which may be NULL,
- * becomes the same of all blocks together. */
-double clt_partition_choose(const clt_partition *partition, int32_t *block, bool *down, double *whole);
+ * of the light that it lets be resolved, or 0 where no cut promises more than noise. */
+double clt_partition_choose(const clt_partition *partition, int32_t *block, bool *down);
 /* Cuts a block in two; its right or lower half becomes the block numbered count, which is returned. */
 int32_t clt_partition_cut(clt_partition *partition, int32_t block, bool down);
 
