@@ -53,23 +53,28 @@ void clt_merge_finish(clt_merge *merge) {
   *merge = (clt_merge){0};
 }
 
+/* Means of a footprint's samples; weight is NULL where all count alike. n samples of weights w tell as much as
+ * (sum w)^2 / sum w^2 alike ones. */
 static clt_merge_sum sum_footprint(const clt_merge *merge, const uint16_t *samples, const int32_t *pixel,
-                                   int64_t count) {
+                                   const float *weight, int64_t count) {
   int channels = merge->camera.channels;
-  float light = 0, unsaturated = 0, raw = 0;
+  float light = 0, unsaturated = 0, squares = 0, raw = 0, all = 0;
   for (int64_t p = 0; p < count; p++) {
     uint16_t code = samples[(size_t)pixel[p] * (size_t)channels];
-    raw += code;
+    float w = weight != NULL ? weight[p] : 1;
+    raw += w * code;
+    all += w;
     if (code < merge->saturated) {
-      light += merge->light[code];
-      unsaturated += 1;
+      light += w * merge->light[code];
+      unsaturated += w;
+      squares += w * w;
     }
   }
-  raw /= (float)count;
+  raw /= all;
   if (unsaturated == 0 || raw >= merge->full) {
     return (clt_merge_sum){.raw = raw};
   }
-  return (clt_merge_sum){.light = light / unsaturated, .count = unsaturated, .raw = raw};
+  return (clt_merge_sum){.light = light / unsaturated, .count = unsaturated * unsaturated / squares, .raw = raw};
 }
 
 void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame) {
@@ -80,9 +85,11 @@ void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame) {
 #pragma omp parallel for schedule(static) if (footprints->cells >= WORTH_SHARING)
   for (size_t i = 0; i < footprints->cells; i++) {
     int64_t first = footprints->start[i], count = footprints->start[i + 1] - first;
+    const float *weight = footprints->weight != NULL ? footprints->weight + first : NULL;
     for (int c = 0; c < channels; c++) {
       sums[(size_t)c * footprints->cells + i] =
-          count > 0 ? sum_footprint(merge, frame->samples + c, footprints->pixel + first, count) : (clt_merge_sum){0};
+          count > 0 ? sum_footprint(merge, frame->samples + c, footprints->pixel + first, weight, count)
+                    : (clt_merge_sum){0};
     }
   }
 }

@@ -17,8 +17,8 @@ enum { CLT_EXPOSURES_MAX = 8 };
 
 /* What one exposure tells of one cell and channel. */
 typedef struct clt_merge_sum {
-  float light; /* mean of h over the unsaturated samples */
-  float count; /* their number; 0: the exposure is saturated, or the cell is not seen */
+  float light; /* mean of h over the unsaturated samples, by the footprint's weights */
+  float count; /* their number, of weights alike; 0: the exposure is saturated, or the cell is not seen */
   float raw;   /* mean code value of all samples */
 } clt_merge_sum;
 
