@@ -34,6 +34,7 @@ static const char notes[] =
 
 typedef struct task {
   const char *replay, *reference;
+  clt_stereo stereo; /* of the reference */
   char folder[CLT_PATH_MAX];
   int panel_width, panel_height;
   clt_curve response;
@@ -112,21 +113,17 @@ static clt_status open_devices(task *t, clt_error *error) {
 }
 
 static clt_status check_epipolar(task *t, clt_error *error) {
-  clt_stereo reference;
   if (t->found.geometry.decode.count[CLT_PIXEL_DECODED] == 0) {
     return CLT_OK; /* findings say so */
   }
-  clt_status status = t->reference != NULL ? clt_stereo_read(t->reference, &reference, error) : CLT_OK;
   cli_progress_note(&t->progress, "epipolar distances");
-  return status ? status
-                : clt_epipolar_check(&t->found.geometry.map, t->reference != NULL ? &reference : NULL,
-                                     &t->found.epipolar, error);
+  return clt_epipolar_check(&t->found.geometry.map, t->reference != NULL ? &t->stereo : NULL, &t->found.epipolar,
+                            error);
 }
 
 static clt_status measure(task *t, clt_error *error) {
   clt_shots shots;
-  clt_stereo probe;
-  clt_status status = t->reference != NULL ? clt_stereo_read(t->reference, &probe, error) : CLT_OK;
+  clt_status status = t->reference != NULL ? clt_stereo_read(t->reference, &t->stereo, error) : CLT_OK;
   if (!status) {
     status = open_devices(t, error);
   }

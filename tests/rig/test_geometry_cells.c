@@ -1,7 +1,7 @@
 /* Footprints of cells by decoded maps: where they lie, what is missing, what is seen twice; and weights in the merge.
  */
-#include "rig/footprint.h"
 #include "rig/geometry/decode.h"
+#include "rig/merge.h"
 #include "structured.h"
 
 /* The camera's place of a panel coordinate, by Newton's method on seen_place. */
@@ -154,11 +154,40 @@ static void cells_seen_twice_are_found(void **state) {
   clt_pixel_map_finish(&map);
 }
 
+/* Rows of unequal weights: the merged radiance is the weighted mean, and its variance that of one. */
+static void the_merge_weighs_pixels(void **state) {
+  (void)state;
+  enum { PIXELS = 5, FULL = 4095 };
+  static const uint16_t samples[PIXELS] = {400, 1000, 2000, 4095, 3000};
+  int64_t start[3] = {0, 3, 5};
+  int32_t pixel[PIXELS] = {2, 0, 1, 3, 4};
+  float weight[PIXELS] = {0.5F, 1, 0.25F, 0.1F, 1}, values[4];
+  const clt_footprints f = {.cells = 2, .start = start, .pixel = pixel, .weight = weight};
+  const clt_camera_info sensor = {
+      .width = PIXELS, .height = 1, .channels = 1, .bits = 12, .responsivity = 2, .full_well = 5000, .read_noise = 3};
+  clt_image radiance = {1, 1, 2, values}, deviation = {1, 1, 2, values + 2};
+  clt_curve linear = {.kind = CLT_CURVE_LINEAR};
+  clt_merge merge;
+  clt_error error = {0};
+  assert_ok(clt_merge_init(&merge, &sensor, &linear, &f, 1, &error), error);
+  const clt_frame frame = {PIXELS, 1, 1, 12, samples, 0, 0.1, 0};
+  clt_merge_add(&merge, 0, &frame);
+  clt_merge_radiance(&merge, &radiance, &deviation);
+  double mean = (0.5 * 2000 + 1 * 400 + 0.25 * 1000) / 1.75 / FULL, alike = 1.75 * 1.75 / (0.25 + 1 + 0.0625);
+  assert_near(radiance.data[0], mean / 0.1 / 2, 1e-6);
+  double variance = (mean / 5000 + pow(3.0 / 5000, 2) + 1.0 / FULL / FULL / 12) / alike;
+  assert_near(deviation.data[0], sqrt(variance) / 0.1 / 2, 1e-6);
+  assert_near(radiance.data[1], 3000.0 / FULL / 0.1 / 2,
+              2e-6); /* without the saturated pixel */
+  clt_merge_finish(&merge);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(centroids_are_right_to_a_tenth_of_a_pixel),
       cmocka_unit_test(cells_in_shadow_and_out_of_sight_have_no_pixels),
       cmocka_unit_test(cells_seen_twice_are_found),
+      cmocka_unit_test(the_merge_weighs_pixels),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
