@@ -25,7 +25,8 @@ typedef struct refiner {
   const float *variance;
   size_t pixels;
   int radius;
-  double pitch;
+  /* Panel pixels that a surface may span to each neighbour. */
+  float reach[2 * RADIUS_MAX + 1][2 * RADIUS_MAX + 1];
 } refiner;
 
 /* The plane's value at the pixel, and its variance (both axes together). */
@@ -63,7 +64,6 @@ static double measure_pitch(const clt_pixel_map *map) {
 static void gather(const refiner *r, int px, int py, window *out) {
   const clt_pixel_map *map = r->map;
   size_t p = (size_t)py * (size_t)map->width + (size_t)px;
-  float steep = (float)(STEEP * r->pitch);
   out->count = 0;
   for (int v = -r->radius; v <= r->radius; v++) {
     for (int u = -r->radius; u <= r->radius; u++) {
@@ -78,7 +78,8 @@ static void gather(const refiner *r, int px, int py, window *out) {
       float dx = map->x[n] - map->x[p], dy = map->y[n] - map->y[p];
       float own = r->variance[n] + r->variance[r->pixels + n];
       float slack = (float)SLACK + (float)SIGMAS * sqrtf(own + r->variance[p] + r->variance[r->pixels + p]);
-      if (hypotf(dx, dy) <= slack + steep * hypotf((float)u, (float)v)) {
+      float reach = slack + r->reach[v + RADIUS_MAX][u + RADIUS_MAX];
+      if (dx * dx + dy * dy <= reach * reach) {
         int k = out->count++;
         out->u[k] = (float)u, out->v[k] = (float)v, out->x[k] = dx, out->y[k] = dy, out->weight[k] = 1 / own;
       }
@@ -192,8 +193,13 @@ clt_status clt_pixel_map_refine(clt_pixel_map *map, const float *variance, doubl
     return status;
   }
   *pitch = measure_pitch(map);
-  refiner r = {map, variance, (size_t)map->width * (size_t)map->height, (int)lround(REACH / *pitch), *pitch};
-  r.radius = r.radius < 1 ? 1 : r.radius > RADIUS_MAX ? RADIUS_MAX : r.radius;
+  refiner r = {.map = map, .variance = variance, .pixels = (size_t)map->width * (size_t)map->height};
+  r.radius = (int)fmin(fmax(lround(REACH / *pitch), 1), RADIUS_MAX);
+  for (int v = -RADIUS_MAX; v <= RADIUS_MAX; v++) {
+    for (int u = -RADIUS_MAX; u <= RADIUS_MAX; u++) {
+      r.reach[v + RADIUS_MAX][u + RADIUS_MAX] = (float)(STEEP * *pitch * hypot(u, v));
+    }
+  }
 #pragma omp parallel for schedule(dynamic, 8)
   for (int y = 0; y < map->height; y++) {
     refine_row(&r, y, &refined);
