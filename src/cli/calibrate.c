@@ -112,13 +112,17 @@ static clt_status open_devices(task *t, clt_error *error) {
   return status;
 }
 
-static clt_status check_epipolar(task *t, clt_error *error) {
+/* A map that cannot be checked is still a map. */
+static void check_epipolar(task *t) {
+  clt_error error = {0};
   if (t->found.geometry.decode.count[CLT_PIXEL_DECODED] == 0) {
-    return CLT_OK; /* findings say so */
+    return; /* findings say so */
   }
   cli_progress_note(&t->progress, "epipolar distances");
-  return clt_epipolar_check(&t->found.geometry.map, t->reference != NULL ? &t->stereo : NULL, &t->found.epipolar,
-                            error);
+  if (clt_epipolar_check(&t->found.geometry.map, t->reference != NULL ? &t->stereo : NULL, &t->found.epipolar,
+                         &error)) {
+    clt_findings_add(&t->found.findings, false, "the map was not checked: %s", error.message);
+  }
 }
 
 static clt_status measure(task *t, clt_error *error) {
@@ -136,7 +140,10 @@ static clt_status measure(task *t, clt_error *error) {
   t->how.context = t;
   clt_shots_init(&shots, t->projector, t->camera, 0, 1, 1);
   status = clt_geometry_measure(&shots, &t->how, &t->found.geometry, &t->found.findings, error);
-  return status ? status : check_epipolar(t, error);
+  if (!status) {
+    check_epipolar(t);
+  }
+  return status;
 }
 
 static int run(const cli_command *command, const cli_arguments *arguments) {

@@ -37,12 +37,17 @@ typedef struct probes {
   bool *lit;
 } probes;
 
+static size_t pixel_of(const clt_pairs *pairs, int p) {
+  size_t x = (size_t)(p % pairs->across * pairs->stride), y = (size_t)(p / pairs->across * pairs->stride);
+  return y * (size_t)pairs->sensor.width + x;
+}
+
 /* Height of a pair's stripes at a probe, by the pixels beside it: the probe's own noise must not choose whether it
  * counts, for bright noise raises difference and sum alike. */
 static float height_at(const clt_pairs *pairs, int pair, int p) {
-  int x = p % pairs->across * pairs->stride, y = p / pairs->across * pairs->stride, width = pairs->sensor.width;
-  const int16_t *row = pairs->difference + (size_t)pair * pairs->pixels + (size_t)y * (size_t)width;
-  return fminf(fabsf((float)row[x > 0 ? x - 1 : x]), fabsf((float)row[x + 1 < width ? x + 1 : x]));
+  const int16_t *at = pairs->difference + (size_t)pair * pairs->pixels + pixel_of(pairs, p);
+  int x = p % pairs->across * pairs->stride;
+  return fminf(fabsf((float)at[x > 0 ? -1 : 0]), fabsf((float)at[x + 1 < pairs->sensor.width ? 1 : 0]));
 }
 
 static void read_probe(probes *seen, int p) {
@@ -53,7 +58,7 @@ static void read_probe(probes *seen, int p) {
     seen->height[(size_t)k * (size_t)pairs->probes + (size_t)p] = height;
     largest = fmaxf(largest, height);
   }
-  seen->lit[p] = largest >= LIT * CLT_PAIRS_FULL;
+  seen->lit[p] = largest >= LIT * CLT_PAIRS_FULL && !pairs->saturated[pixel_of(pairs, p)];
   for (int c = 0; c < pairs->sensor.channels; c++) {
     double sum = 0;
     for (int k = 0; k < pairs->pairs; k++) {

@@ -133,7 +133,7 @@ static long summarise(points *p, float least, double *median, double *upper) {
 clt_status clt_epipolar_check(const clt_pixel_map *map, const clt_stereo *reference, clt_epipolar *out,
                               clt_error *error) {
   points p;
-  *out = (clt_epipolar){.fitted = reference == NULL};
+  *out = (clt_epipolar){.fitted = reference == NULL}; /* count stays 0 on failure */
   clt_status status = take_points(map, &p, error);
   if (status == CLT_OK) {
     status = measure(&p, reference, error);

@@ -18,7 +18,8 @@ typedef struct clt_epipolar {
   double sure_median, sure_upper;
 } clt_epipolar;
 
-/* Checks against reference, or NULL. CLT_BAD_INPUT where fewer than 100 pixels are decoded. */
+/* Checks against reference, or NULL. CLT_BAD_INPUT where fewer than 100 pixels are decoded, CLT_FAILED where no
+ * fundamental matrix fits; count is then 0. */
 clt_status clt_epipolar_check(const clt_pixel_map *map, const clt_stereo *reference, clt_epipolar *out,
                               clt_error *error);
 

@@ -43,9 +43,9 @@ float clt_pixel_confidence(double variance);
 
 /* x, y and confidence as an image of three channels. out is initialised here. */
 clt_status clt_pixel_map_image(const clt_pixel_map *map, clt_image *out, clt_error *error);
-/* A picture to look at: decoded pixels coloured by their place on the panel (red grows to the right, green downwards,
- * with a grid line every sixteenth of the panel), masked ones grey, or in the colour of their fate: saturated white,
- * ambiguous blue, outside magenta, isolated yellow, double cyan, unlit black. out is initialised here. */
+/* A picture to look at: decoded pixels coloured by their place on the panel (red grows to the right, green downwards, a
+ * dark line every sixteenth of the panel), masked ones by their fate: unlit black, saturated white, ambiguous blue,
+ * outside magenta, isolated yellow, double cyan. out is initialised here. */
 clt_status clt_pixel_map_coverage(const clt_pixel_map *map, clt_image *out, clt_error *error);
 
 #endif
