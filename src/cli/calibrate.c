@@ -10,6 +10,8 @@
 #include "cli/progress.h"
 #include "counterlight/replay.h"
 
+#define ANY_EXPOSURE_S 0.01 /* pictures have whatever is asked for */
+
 static const cli_option options[] = {
     {"replay", 0, "DIR", "a recording, a folder of pictures, or a list of them"},
     {"panel", 0, "WxH", "the panel's pixels (a recording knows them; default 1280x720)"},
@@ -87,29 +89,28 @@ static bool show_progress(void *context, int done, int total) {
   return !cli_interrupted();
 }
 
-/* Opens the replay and lays the Gray code out. */
-static clt_status open_devices(task *t, clt_error *error) {
-  if (clt_replay_is_recording(t->replay)) {
-    clt_projector_info panel;
-    clt_camera_info sensor;
-    clt_status status = clt_replay_open(t->replay, &t->projector, &t->camera, error);
-    if (status) {
-      return status;
-    }
-    t->projector->driver->describe(t->projector, &panel);
-    t->camera->driver->describe(t->camera, &sensor);
-    t->exposure_s = t->exposure_s > 0 ? t->exposure_s : sensor.exposure_max_s;
-    return clt_gray_init(&t->how.gray, panel.width, panel.height, error);
+static clt_status open_recording(task *t, clt_error *error) {
+  clt_projector_info panel;
+  double longest_s = 0;
+  clt_status status = clt_replay_longest_exposure(t->replay, &longest_s, error);
+  if (!status) {
+    status = clt_replay_open(t->replay, &t->projector, &t->camera, error);
   }
+  if (status) {
+    return status;
+  }
+  t->projector->driver->describe(t->projector, &panel);
+  t->how.exposure_s = t->exposure_s > 0 ? t->exposure_s : longest_s;
+  return clt_gray_init(&t->how.gray, panel.width, panel.height, error);
+}
+
+static clt_status open_pictures(task *t, clt_error *error) {
   int pictures = 0;
   clt_status status =
       clt_replay_open_pictures(t->replay, t->panel_width, t->panel_height, &t->projector, &t->camera, &pictures, error);
-  if (!status) {
-    status = clt_gray_init_counted(&t->how.gray, t->panel_width, t->panel_height, pictures, error);
-  }
-  t->exposure_s = t->exposure_s > 0 ? t->exposure_s : 1 / 60.0;
+  t->how.exposure_s = t->exposure_s > 0 ? t->exposure_s : ANY_EXPOSURE_S;
   t->response = t->response_given ? t->response : (clt_curve){.kind = CLT_CURVE_SRGB};
-  return status;
+  return status ? status : clt_gray_init_counted(&t->how.gray, t->panel_width, t->panel_height, pictures, error);
 }
 
 /* A map that cannot be checked is still a map. */
@@ -129,12 +130,11 @@ static clt_status measure(task *t, clt_error *error) {
   clt_shots shots;
   clt_status status = t->reference != NULL ? clt_stereo_read(t->reference, &t->stereo, error) : CLT_OK;
   if (!status) {
-    status = open_devices(t, error);
+    status = clt_replay_is_recording(t->replay) ? open_recording(t, error) : open_pictures(t, error);
   }
   if (status) {
     return status;
   }
-  t->how.exposure_s = t->exposure_s;
   t->how.response = t->response;
   t->how.progress = show_progress;
   t->how.context = t;

@@ -158,6 +158,9 @@ static void a_recording_comes_back_sample_by_sample(void **state) {
   record(folder, recording, was);
   assert_true(clt_replay_is_recording(recording));
   assert_false(clt_replay_is_recording(folder));
+  double longest_s;
+  assert_ok(clt_replay_longest_exposure(recording, &longest_s, &error), error);
+  assert_true(longest_s == 0.02);
   assert_ok(clt_replay_open(recording, &projector, &camera, &error), error);
   describe_camera(NULL, &wanted);
   camera->driver->describe(camera, &sensor);

@@ -1,5 +1,7 @@
 """calibrate on pictures made here: a wall with a shadow and a highlight, seen by a camera whose map is known."""
 import json
+import struct
+import zlib
 
 import numpy as np
 
@@ -37,6 +39,32 @@ def pictures(growth=0.0):
                 light[HIGHLIGHT] *= 4
                 frames.append(light * (1 + growth * len(frames) / 24))
     return frames
+
+
+def hash_of(number):
+    """Of pattern number's codes, each 0 or 255."""
+    axis, within = divmod(number, 12)
+    at = np.arange(PANEL[axis])
+    row = ((at ^ at >> 1) >> (5 - within // 2) & 1) ^ within % 2
+    codes = 255 * (np.broadcast_to(row, PANEL[::-1]) if axis == 0 else np.broadcast_to(row[:, None], PANEL[::-1]))
+    word, whole = 0, 2 ** 64 - 1
+    for code in codes.reshape(-1).tolist():
+        word = (word + code + 1) & whole
+        word = ((word ^ word >> 30) * 0xbf58476d1ce4e5b9) & whole
+        word = ((word ^ word >> 27) * 0x94d049bb133111eb) & whole
+        word ^= word >> 31
+    return word
+
+
+def write_png16(path, samples):
+    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in samples)
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", samples.shape[1], samples.shape[0], 16, 0, 0, 0, 0)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) +
+                     chunk(b"IEND", b""))
 
 
 class Calibrate(PathTest):
@@ -79,6 +107,37 @@ class Calibrate(PathTest):
         for text in ("saturated: ", "unlit: ", f"{decoded.sum()} of 6912"):
             self.assertIn(text, printed)
         self.assertNotIn("WRONG", printed)
+
+    def record(self, frames):
+        """A recording by its description alone: 12 bit, linear, black level 100, two frames a pattern, the first too dark."""
+        folder, random, sequence = self.folder / "recording", np.random.default_rng(6), 0
+        folder.mkdir()
+        lines = ["counterlight-recording 1", "panel 64 48 1 8 0.0166",
+                 "camera 96 72 1 12 0.0333 0.0001 0.1 100 1 10000 4"]
+        for n, light in enumerate(frames):
+            shown = 10 ** 9 * (n + 1)
+            for part in (0.5, 1):
+                samples = 100 + 3995 * np.minimum(part * light, 1) + random.normal(0, 3, light.shape)
+                write_png16(folder / f"{sequence}.png", np.clip(np.round(samples), 0, 4095))
+                lines.append(f"frame {sequence} {n + 1} {hash_of(n):016x} {shown} {shown + 10 ** 7 + sequence} "
+                             f"{0.02 * part} {sequence}.png")
+                sequence += 1
+        (folder / "index.txt").write_text("\n".join(lines) + "\n")
+        return folder
+
+    def test_recording_is_replayed(self):
+        folder, out = self.record(pictures()), self.folder / "out"
+        answer = answer_of("calibrate", "--replay", folder, "-o", out)
+        x, y, _ = np.load(out / "map.npy")
+        true_x, true_y = places()
+        decoded = np.isfinite(x)
+        self.assertGreater(decoded.sum(), 6200)
+        self.assertLess(np.median(np.hypot(x - true_x, y - true_y)[decoded]), 0.05)
+        self.assertEqual([f for f in answer["findings"] if f["serious"]], [])
+        answer_of("calibrate", "--replay", folder, "-o", out, "--exposure-ms", 10)
+        index = (folder / "index.txt").read_text()
+        (folder / "index.txt").write_text(index.replace(f"{hash_of(5):016x}", f"{hash_of(7):016x}"))
+        self.refused("calibrate", "--replay", folder, "-o", self.folder / "new", names="recorded for another pattern")
 
     def test_exposure_that_moves_is_told(self):
         words = ("--panel", "64x48", "-o", self.folder / "out")

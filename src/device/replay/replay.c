@@ -178,6 +178,20 @@ bool clt_replay_is_recording(const char *folder) {
   return clt_index_path(folder, path, NULL) == CLT_OK && access(path, F_OK) == 0;
 }
 
+clt_status clt_replay_longest_exposure(const char *folder, double *seconds, clt_error *error) {
+  clt_index index;
+  *seconds = 0;
+  clt_status status = clt_index_read(folder, &index, error);
+  if (status != CLT_OK) {
+    return status;
+  }
+  for (long k = 0; k < index.count; k++) {
+    *seconds = index.record[k].exposure_s > *seconds ? index.record[k].exposure_s : *seconds;
+  }
+  clt_index_finish(&index);
+  return *seconds > 0 ? CLT_OK : clt_fail(error, CLT_BAD_INPUT, "%s: the recording has no frames", folder);
+}
+
 clt_status clt_replay_open(const char *folder, clt_projector **projector, clt_camera **camera, clt_error *error) {
   replay *self = clt_alloc(1, sizeof *self);
   if (self == NULL) {
