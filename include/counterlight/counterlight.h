@@ -7,6 +7,7 @@
 #include "counterlight/analysis.h"
 #include "counterlight/device.h"
 #include "counterlight/image.h"
+#include "counterlight/panel.h"
 #include "counterlight/rig.h"
 #include "counterlight/scene.h"
 #include "counterlight/solve.h"
