@@ -165,7 +165,8 @@ void clt_scene_rig_config(const clt_scene *scene, clt_rig_config *config) {
                              .height = description->height,
                              .projector = description->projector.response,
                              .camera = description->camera.response,
-                             .latency_s = description->projector.latency_s + description->projector.refresh_s,
+                             .latency_s = description->projector.latency_s + description->projector.jitter_s +
+                                          description->projector.refresh_s,
                              .attempts = 3};
   choose_exposures(scene, config);
   double longest_s = fmax(config->exposures_s[config->exposure_count - 1], description->camera.frame_s);
