@@ -85,7 +85,7 @@ static clt_status photograph(task *t, clt_error *error) {
 static clt_status simulate(const char *path, task *t, clt_error *error) {
   clt_status status = open_scene(path, t, error);
   if (!status) {
-    status = cli_drive_read(t->drive_path, &t->rig.projector, &t->grid, &t->drive, error);
+    status = cli_drive_read(t->drive_path, &t->rig.projector.response[0], &t->grid, &t->drive, error);
   }
   if (!status) {
     status = t->exact ? clt_scene_appearance(t->station.scene, &t->drive, &t->seen, error) : photograph(t, error);

@@ -51,17 +51,8 @@ void output_destroy(output *main) {
 }
 
 void output_encode(const output_drive *picture, const clt_projector_info *panel, float *codes) {
-  const clt_image *drive = &picture->drive;
-  for (int c = 0; c < panel->channels; c++) {
-    int from = c < drive->channels ? c : 0;
-    for (int y = 0; y < panel->height; y++) {
-      size_t row = ((size_t)from * drive->height + (size_t)y * drive->height / panel->height) * drive->width;
-      for (int x = 0; x < panel->width; x++) {
-        float light = drive->data[row + (size_t)x * drive->width / panel->width];
-        codes[((size_t)c * panel->height + y) * panel->width + x] = (float)clt_curve_encode(&picture->response, light);
-      }
-    }
-  }
+  clt_panel response = clt_panel_of_curve(&picture->response);
+  clt_panel_encode(&response, &picture->drive, panel->channels, panel->height, panel->width, codes);
 }
 
 /* Makes the drive's codes for the panel that is open. */
@@ -86,7 +77,7 @@ static clt_curve known_response(const output *main, const clt_station_config *co
   if (main->station.scene != NULL && !config->projector_response_given) {
     clt_scene_rig_config(main->station.scene, &suggested);
   }
-  return suggested.projector;
+  return suggested.projector.response[0];
 }
 
 static void report_opened(output *main, const clt_error *error) {

@@ -87,8 +87,7 @@ void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame) {
   }
 }
 
-/* Variance of the estimate of the rate by one exposure, were the rate e. */
-static double variance_at(const clt_merge *merge, const clt_merge_sum *sum, double t, double e) {
+double clt_merge_variance(const clt_merge *merge, const clt_merge_sum *sum, double t, double e) {
   const clt_camera_info *camera = &merge->camera;
   double read = camera->read_noise / camera->full_well;
   double step = merge->slope[(int)(sum->raw + 0.5f)] / ((1 << camera->bits) - 1 - camera->black_level);
@@ -119,7 +118,7 @@ static double merge_rate(const clt_merge *merge, const clt_merge_sum *sums, size
     for (int k = 0; k < merge->exposures; k++) {
       const clt_merge_sum *sum = &sums[(size_t)k * stride];
       if (sum->count > 0) {
-        double w = 1 / variance_at(merge, sum, merge->seconds[k], e);
+        double w = 1 / clt_merge_variance(merge, sum, merge->seconds[k], e);
         weighted += w * sum->light / merge->seconds[k];
         weights += w;
       }

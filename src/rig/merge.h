@@ -46,4 +46,7 @@ void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame);
  * the largest that the exposures prove (0 where the cell is not seen). */
 void clt_merge_radiance(const clt_merge *merge, clt_image *radiance, clt_image *deviation);
 
+/* Variance of the rate that one exposure of t seconds gives a value, were the rate e. */
+double clt_merge_variance(const clt_merge *merge, const clt_merge_sum *sum, double t, double e);
+
 #endif

@@ -163,7 +163,7 @@ void clt_scene_rig_config(const clt_scene *scene, clt_rig_config *config) {
   const clt_scene_description *description = &scene->description;
   *config = (clt_rig_config){.width = description->width,
                              .height = description->height,
-                             .projector = description->projector.response,
+                             .projector = clt_panel_of_curve(&description->projector.response),
                              .camera = description->camera.response,
                              .latency_s = description->projector.latency_s + description->projector.jitter_s +
                                           description->projector.refresh_s,
