@@ -106,22 +106,16 @@ static size_t check_pair(clt_agreement *agreement, const clt_merge *merge, int a
 }
 
 size_t clt_agreement_check(clt_agreement *agreement, const clt_merge *merge, bool bad[CLT_EXPOSURES_MAX]) {
-  int against[CLT_EXPOSURES_MAX] = {0}, most = 0;
   size_t worst = 0, values = (size_t)agreement->width * (size_t)agreement->height * (size_t)merge->camera.channels;
   memset(agreement->doubtful, 0, values);
+  memset(bad, 0, sizeof(bool[CLT_EXPOSURES_MAX]));
   for (int b = 1; b < merge->exposures; b++) {
     for (int a = 0; a < b; a++) {
       size_t apart = check_pair(agreement, merge, a, b);
-      against[a] += apart > 0;
-      against[b] += apart > 0;
+      bad[a] = bad[a] || apart > 0;
+      bad[b] = bad[b] || apart > 0;
       worst = apart > worst ? apart : worst;
     }
-  }
-  for (int k = 0; k < merge->exposures; k++) {
-    most = against[k] > most ? against[k] : most;
-  }
-  for (int k = 0; k < merge->exposures; k++) {
-    bad[k] = most > 0 && against[k] == most;
   }
   return worst;
 }

@@ -17,9 +17,9 @@ typedef struct clt_agreement {
 clt_status clt_agreement_init(clt_agreement *agreement, int width, int height, int channels, clt_error *error);
 void clt_agreement_finish(clt_agreement *agreement);
 
-/* Compares every pair of the merge's exposures and marks in bad[] those that contradict most of the others (both of
- * two). Returns how many values (cells of a channel) contradict each other in the worst pair, or rows' sums where these
- * alone do; 0: all agree. doubtful is set. */
+/* Compares every pair of the merge's exposures and marks in bad[] every one that contradicts another: two that were
+ * torn alike outvote one that was not, so that all are taken again. Returns how many values (cells of a channel)
+ * contradict each other in the worst pair, or rows' sums where these alone do; 0: all agree. doubtful is set. */
 size_t clt_agreement_check(clt_agreement *agreement, const clt_merge *merge, bool bad[CLT_EXPOSURES_MAX]);
 
 #endif
