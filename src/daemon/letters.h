@@ -54,7 +54,7 @@ typedef struct output_order {
 /* A drive to show from now on: linear light; the panel is a whole multiple of its size, or of one channel. */
 typedef struct output_drive {
   clt_image drive;
-  clt_curve response; /* of the panel */
+  clt_panel panel; /* that it is for */
 } output_drive;
 
 /* A picture of panel codes to show at once and until the next pattern; without codes: measuring has ended, the drive
@@ -73,7 +73,7 @@ typedef struct output_opened {
   clt_station *station;
   clt_projector_info projector;
   char projector_name[32], camera_name[32];
-  clt_curve response; /* of the panel as far as it is known before the rig is */
+  clt_panel panel; /* as far as it is known before the rig is */
 } output_opened;
 
 typedef struct output_frames {

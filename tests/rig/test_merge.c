@@ -57,9 +57,14 @@ static void expose(merge_bench *bench, int exposure, double t, const double *rad
   clt_merge_add(&bench->merge, exposure, &frame);
 }
 
+/* Three exposures 1 : 8 : 64, or up to eight, each twice the one before. */
+static double seconds_at(int exposures, int k) {
+  return exposures <= EXPOSURES ? seconds[k] : 0.5e-3 * (1 << k);
+}
+
 static void take_all(merge_bench *bench, const double *radiance, double noise) {
   for (int k = 0; k < bench->merge.exposures; k++) {
-    expose(bench, k, seconds[k], radiance, noise);
+    expose(bench, k, seconds_at(bench->merge.exposures, k), radiance, noise);
   }
   clt_merge_radiance(&bench->merge, &bench->radiance, &bench->deviation);
 }
@@ -71,10 +76,10 @@ static void spread_radiances(double *radiance) {
   }
 }
 
-static void check_statistics(clt_curve curve) {
+static void check_statistics(clt_curve curve, int exposures) {
   enum { SEEDS = 1500 };
   merge_bench bench = {.random = 42};
-  open_bench(&bench, curve, EXPOSURES);
+  open_bench(&bench, curve, exposures);
   double truth[CELLS], sum[CELLS] = {0}, square[CELLS] = {0}, reported[CELLS] = {0};
   spread_radiances(truth);
   for (int n = 0; n < SEEDS; n++) {
@@ -106,12 +111,17 @@ static void check_statistics(clt_curve curve) {
 
 static void merged_noise_is_unbiased_and_as_large_as_reported(void **state) {
   (void)state;
-  check_statistics((clt_curve){.kind = CLT_CURVE_LINEAR});
+  check_statistics((clt_curve){.kind = CLT_CURVE_LINEAR}, EXPOSURES);
 }
 
 static void a_curved_response_keeps_both(void **state) {
   (void)state;
-  check_statistics((clt_curve){.kind = CLT_CURVE_SRGB});
+  check_statistics((clt_curve){.kind = CLT_CURVE_SRGB}, EXPOSURES);
+}
+
+static void eight_exposures_keep_both(void **state) {
+  (void)state;
+  check_statistics((clt_curve){.kind = CLT_CURVE_LINEAR}, CLT_EXPOSURES_MAX);
 }
 
 /* Without noise the merge gives the radiance up to rounding of the samples, and the closed form of its variance. */
@@ -227,6 +237,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(merged_noise_is_unbiased_and_as_large_as_reported),
       cmocka_unit_test(a_curved_response_keeps_both),
+      cmocka_unit_test(eight_exposures_keep_both),
       cmocka_unit_test(clean_frames_give_the_closed_form),
       cmocka_unit_test(saturated_exposures_are_left_out),
       cmocka_unit_test(one_hot_pixel_does_not_spoil_its_cell),
