@@ -29,20 +29,15 @@ typedef struct rough_room {
 static const double rough_crosstalk[3][3] = {
     {1 / 1.07, 0.05 / 1.07, 0.02 / 1.07}, {0.03 / 1.08, 1 / 1.08, 0.05 / 1.08}, {0.01 / 1.05, 0.04 / 1.05, 1 / 1.05}};
 
-/* A wall that the projector lights unevenly; further keys of the projector, the camera and the scene. */
-static inline void rough_open(rough_room *room, unsigned seed, rough_settings settings) {
+/* Opens the scene of a text with its devices. */
+static inline void rough_open_text(rough_room *room, const char *text) {
   char folder[64], path[96];
   clt_error error = {0};
   test_folder(folder);
   snprintf(path, sizeof path, "%s/scene.cfg", folder);
   FILE *file = fopen(path, "w");
   assert_non_null(file);
-  fprintf(file,
-          "seed = %u; grid = { width = %d; height = %d; channels = 3; rays = 2; }; "
-          "projector = { position = [0.5, -2.0, 0.3]; target = [0.0, 0.0, 0.0]; %s }; camera = { %s }; %s "
-          "materials = ( { name = \"m\"; albedo = [0.7, 0.6, 0.5]; } ); "
-          "surfaces = ( { corner = [-4, 0, -4]; u = [8, 0, 0]; v = [0, 0, 8]; material = \"m\"; } );",
-          seed, ROUGH_WIDTH, ROUGH_HEIGHT, settings.projector, settings.camera, settings.others);
+  fputs(text, file);
   fclose(file);
   assert_ok(clt_scene_open(path, &room->scene, &error), error);
   unlink(path);
@@ -52,6 +47,18 @@ static inline void rough_open(rough_room *room, unsigned seed, rough_settings se
   clt_rig_config config;
   clt_scene_rig_config(room->scene, &config);
   clt_shots_init(&room->shots, room->projector, room->camera, config.latency_s, 10.0, 3);
+}
+
+/* A wall that the projector lights unevenly; further keys of the projector, the camera and the scene. */
+static inline void rough_open(rough_room *room, unsigned seed, rough_settings settings) {
+  char text[2000];
+  snprintf(text, sizeof text,
+           "seed = %u; grid = { width = %d; height = %d; channels = 3; rays = 2; }; "
+           "projector = { position = [0.5, -2.0, 0.3]; target = [0.0, 0.0, 0.0]; %s }; camera = { %s }; %s "
+           "materials = ( { name = \"m\"; albedo = [0.7, 0.6, 0.5]; } ); "
+           "surfaces = ( { corner = [-4, 0, -4]; u = [8, 0, 0]; v = [0, 0, 8]; material = \"m\"; } );",
+           seed, ROUGH_WIDTH, ROUGH_HEIGHT, settings.projector, settings.camera, settings.others);
+  rough_open_text(room, text);
 }
 
 static inline void rough_close(rough_room *room) {
