@@ -147,7 +147,8 @@ static void add_exposure(const clt_exposure_needs *needs, double seconds, bool u
 
 void clt_exposures_choose(const clt_exposure_needs *needs, clt_exposure_choice *choice) {
   const double filled = 0.8, between_snr = 30, ratio_least = 2, ratio_most = 8;
-  double shortest = filled / needs->brightest;
+  bool flicker_too;
+  double shortest = whole_periods(needs, filled / needs->brightest, false, &flicker_too);
   double r = needs->read_noise, s = needs->snr;
   /* n / sqrt(n + r^2) = s solved for the electrons n. */
   double electrons = 0.5 * (s * s + sqrt(s * s * s * s + 4 * s * s * r * r));

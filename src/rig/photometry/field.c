@@ -9,6 +9,9 @@
 #define SATURATED 0.97
 /* A pixel is well lit from this share of the 90th percentile on. */
 #define WELL_LIT 0.25
+/* That percentile is at least this, of full scale, and so many times the noise. */
+#define LEAST_GAIN 1e-4f
+#define LEAST_OVER_NOISE 4
 
 clt_status clt_field_bench_init(clt_field_bench *bench, clt_shots *shots, clt_error *error) {
   const clt_camera_info *sensor = &shots->sensor;
@@ -140,13 +143,14 @@ static clt_status sort_into_groups(clt_field_bench *bench, const float *gain, fl
     sorted[p] = gain[p];
   }
   qsort(sorted, pixels, sizeof *sorted, compare_floats);
-  float least = WELL_LIT * sorted[pixels * 9 / 10];
-  if (!(least > 1e-4f)) {
+  float bright = sorted[pixels * 9 / 10], noise = fmaxf(-sorted[pixels / 10], 0), least = WELL_LIT * bright;
+  /* Of noise alone as much is below nothing as above. */
+  if (!(bright > LEAST_GAIN && bright > LEAST_OVER_NOISE * noise)) {
     return clt_fail(
         error, CLT_FAILED,
         "the white panel is hardly brighter to the camera than the dark one (by %.2g of full scale); is the "
         "projector on, its shutter open, and the camera looking at its picture?",
-        (double)sorted[pixels * 9 / 10]);
+        (double)bright);
   }
   size_t first = 0;
   while (sorted[first] < least) {
