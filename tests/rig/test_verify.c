@@ -39,6 +39,11 @@ static void late(wrapped_camera *self, clt_frame *frame) {
   add_noise(self, frame);
 }
 
+static void honest(wrapped_camera *self, clt_frame *frame) {
+  (void)self;
+  (void)frame;
+}
+
 /* For ever what the first frame saw, with noise of its own. */
 static void frozen(wrapped_camera *self, clt_frame *frame) {
   static uint16_t first[WRAPPED_SAMPLES_MAX];
@@ -64,7 +69,7 @@ static void always_late(wrapped_camera *self, clt_frame *frame) {
 }
 
 typedef struct outcome {
-  int right, refused, wrong;
+  int right, refused, wrong, left_out; /* pictures; values without a radiance */
   long faults;
   double worst; /* departure less six deviations, of white */
   char message[CLT_MESSAGE_MAX];
@@ -94,6 +99,8 @@ static void compare(const rough_room *room, const clt_image *drive, const clt_im
     } else if (isfinite(deviation->data[k])) {
       double off = fabs((double)seen->data[k] - (double)exact.data[k]) - 6 * (double)deviation->data[k];
       worst = fmax(worst, off / white);
+    } else {
+      out->left_out++;
     }
   }
   out->worst = fmax(out->worst, worst);
@@ -108,6 +115,10 @@ typedef struct trouble {
   bool verify;
   int side, exposures; /* of the patch, or 0; of the rig, or 0: as the scene suggests */
 } trouble;
+
+/* Faults of the simulator itself. */
+static const char simulated_faults[] =
+    "cell_pixels = 2; faults = { dropped = 0.05; stuck = 0.05; torn = 0.05; late = 0.05; late_ms = 60.0; };";
 
 static clt_rig *open_rig(rough_room *room, wrapped_camera *camera, const trouble *with, clt_rig_config *config) {
   clt_rig *rig = NULL;
@@ -131,8 +142,9 @@ static outcome observe(unsigned seed, trouble with) {
   clt_image drive = {0}, seen = {0}, deviation = {0}, *images[] = {&drive, &seen, &deviation};
   outcome out = {0};
   uint64_t random = seed;
-  rough_open(&room, seed, (rough_settings){STEADY_PANEL, "cell_pixels = 2;", "ambient = 0.002;"});
-  wrapped_init(&camera, room.camera, with.trick, with.chance, seed);
+  const char *keys = with.trick == NULL ? simulated_faults : "cell_pixels = 2;";
+  rough_open(&room, seed, (rough_settings){STEADY_PANEL, keys, "ambient = 0.002;"});
+  wrapped_init(&camera, room.camera, with.trick == NULL ? honest : with.trick, with.chance, seed);
   clt_rig *rig = open_rig(&room, &camera, &with, &config);
   for (int n = 0; n < 3; n++) {
     assert_ok(clt_image_init(images[n], 3, ROUGH_HEIGHT, ROUGH_WIDTH, &error), error);
@@ -160,7 +172,24 @@ static outcome observe(unsigned seed, trouble with) {
   return out;
 }
 
-enum { SEEDS = 4 };
+enum { SEEDS = 3 };
+
+/* Two pixels that always say the same and one that is always full: their cells contradict themselves at every attempt,
+ * and only they are left out. */
+static void defective(wrapped_camera *self, clt_frame *frame) {
+  self->samples[(5 * frame->width + 9) * 3] = 1900;
+  self->samples[(30 * frame->width + 40) * 3 + 1] = 2500;
+  self->samples[(20 * frame->width + 20) * 3 + 2] = 4095;
+}
+
+static void defective_pixels_do_not_stop_the_rig(void **state) {
+  (void)state;
+  for (unsigned seed = 1; seed <= SEEDS; seed++) {
+    outcome out = observe(seed, (trouble){defective, 0, true, 0, 0});
+    assert_int_equal(out.right, PICTURES);
+    assert_true(out.left_out > 0 && out.left_out <= 2 * PICTURES);
+  }
+}
 
 static void honest_frames_pass(void **state) {
   (void)state;
@@ -194,6 +223,18 @@ static void frames_that_contradict_are_taken_again(void **state) {
   }
 }
 
+static void faults_of_the_simulator_are_survived(void **state) {
+  (void)state;
+  int wrong = 0, refused = 0;
+  for (unsigned seed = 1; seed <= 2 * SEEDS; seed++) {
+    wrong += observe(seed, (trouble){NULL, 0, false, 0, 0}).wrong;
+    outcome out = observe(seed, (trouble){NULL, 0, true, 0, 0});
+    assert_int_equal(out.wrong, 0);
+    refused += out.refused;
+  }
+  assert_true(wrong > SEEDS && refused <= 2);
+}
+
 static void the_patch_tells_pictures_apart(void **state) {
   (void)state;
   for (unsigned seed = 1; seed <= SEEDS; seed++) {
@@ -222,6 +263,8 @@ int main(void) {
       cmocka_unit_test(honest_frames_pass),
       cmocka_unit_test(stuck_frames_are_taken_again),
       cmocka_unit_test(frames_that_contradict_are_taken_again),
+      cmocka_unit_test(faults_of_the_simulator_are_survived),
+      cmocka_unit_test(defective_pixels_do_not_stop_the_rig),
       cmocka_unit_test(the_patch_tells_pictures_apart),
       cmocka_unit_test(a_device_that_keeps_failing_is_refused_with_numbers),
   };

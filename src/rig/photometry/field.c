@@ -87,7 +87,7 @@ static void add_frame(const clt_field_bench *bench, const clt_frame *frame, clt_
 
 clt_status clt_field_take(clt_field_bench *bench, int64_t ready_ns, double seconds, int frames, clt_field_look *look,
                           void *context, clt_field *field, clt_error *error) {
-  *field = (clt_field){.seconds = seconds};
+  *field = (clt_field){.seconds = 0};
   for (int n = 0; n < frames; n++) {
     clt_frame frame;
     clt_status status = clt_shots_take(bench->shots, ready_ns, seconds, &frame, error);
@@ -98,6 +98,7 @@ clt_status clt_field_take(clt_field_bench *bench, int64_t ready_ns, double secon
     if (look != NULL) {
       look(context, bench, &frame);
     }
+    field->seconds += frame.exposure_s / frames;
     field->at_s += ((double)frame.exposed_ns * 1e-9 + 0.5 * frame.exposure_s) / frames;
     ready_ns = frame.exposed_ns + 1;
   }

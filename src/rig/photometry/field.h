@@ -26,7 +26,7 @@ typedef struct clt_field {
   double light[CLT_FIELD_CHANNELS];     /* mean over the lit pixels, fraction of full scale */
   double saturated[CLT_FIELD_CHANNELS]; /* share of lit pixels near full scale */
   double brightest;                     /* largest over channels of the groups' mean sample, fraction of full scale */
-  double seconds;                       /* exposure */
+  double seconds;                       /* exposure that the frames had */
   double at_s;                          /* middle of the exposures, on the camera's clock */
 } clt_field;
 

@@ -99,10 +99,10 @@ static clt_status choose_exposures(clt_field_bench *bench, const clt_photometry_
       clt_curve_decode(&out->camera, (field.brightest * full - out->black_level) / (full - out->black_level));
   double mean = 0, darkest = INFINITY;
   for (int c = 0; c < bench->channels; c++) {
-    mean = field.light[c] / report->base_s;
+    mean = field.light[c] / field.seconds;
     darkest = fmin(darkest, fmax(out->black[c], 1e-4) * mean);
   }
-  clt_exposure_needs needs = {.brightest = brightest / report->base_s,
+  clt_exposure_needs needs = {.brightest = brightest / field.seconds,
                               .darkest = darkest,
                               .snr = options->snr,
                               .full_well = out->full_well,

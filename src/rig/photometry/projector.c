@@ -55,7 +55,7 @@ static clt_status see_dark(ramps *self, clt_error *error) {
       break;
     }
     for (int c = 0; c < self->bench->channels && status == CLT_OK; c++) {
-      self->dark[k][c] = field.light[c] / seconds;
+      self->dark[k][c] = field.light[c] / field.seconds;
     }
     self->exposures = k + 1;
   }
@@ -75,7 +75,7 @@ static clt_status see_reference(ramps *self, clt_error *error) {
     reference *made = &self->references[self->reference_count++];
     made->at_s = field.at_s;
     for (int c = 0; c < self->bench->channels; c++) {
-      made->rate[c] = field.light[c] / self->base_s - self->dark[0][c];
+      made->rate[c] = field.light[c] / field.seconds - self->dark[0][c];
     }
   }
   return status;
