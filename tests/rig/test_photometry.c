@@ -41,11 +41,11 @@ static void check_report(const clt_photometry *found, const clt_photometry_repor
   assert_true(report->exposures.snr >= 40);
 }
 
-static void measure(unsigned seed, const rough_case *truth) {
-  char projector[300], camera[200];
+static void measure(unsigned seed, const rough_case *truth, const char *faults) {
+  char projector[300], camera[300];
   snprintf(projector, sizeof projector, "response = \"%s\"; latency_ms = 37; " ROUGH_PANEL, truth->projector);
-  snprintf(camera, sizeof camera, "response = \"%s\"; full_well = %g; read_noise = %g; bits = %d;", truth->camera,
-           truth->full_well, truth->read_noise, truth->bits);
+  snprintf(camera, sizeof camera, "response = \"%s\"; full_well = %g; read_noise = %g; bits = %d; %s", truth->camera,
+           truth->full_well, truth->read_noise, truth->bits, faults);
   rough_room room;
   rough_open(&room, seed, (rough_settings){projector, camera, ROUGH_LIGHT});
   room.shots.sensor.full_well = 1; /* none of these is to be taken from the driver */
@@ -79,6 +79,7 @@ static void measure(unsigned seed, const rough_case *truth) {
   assert_true(crosstalk_error <= 0.001 && black_error <= 5e-5);
   assert_true(fabs(well_error) <= 0.03 && fabs(noise_error) <= 0.05);
   assert_int_equal(found.camera.kind, strcmp(truth->camera, "linear") == 0 ? CLT_CURVE_LINEAR : CLT_CURVE_TABLE);
+  assert_true(faults[0] != 0 || report.camera.residual < 0.0015); /* half of what is a finding */
   check_report(&found, &report);
   rough_close(&room);
 }
@@ -87,14 +88,22 @@ static void rough_rooms_are_measured(void **state) {
   (void)state;
   for (unsigned seed = 1; seed <= 2; seed++) {
     for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-      measure(seed, &cases[n]);
+      measure(seed, &cases[n], "");
     }
   }
+}
+
+/* Frames that are dropped, stuck and torn change none of it. */
+static void rough_rooms_are_measured_by_faulty_cameras(void **state) {
+  (void)state;
+  measure(3, &cases[0], "faults = { dropped = 0.03; stuck = 0.03; torn = 0.03; };");
+  measure(4, &cases[1], "faults = { dropped = 0.03; stuck = 0.03; torn = 0.03; };");
 }
 
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(rough_rooms_are_measured),
+      cmocka_unit_test(rough_rooms_are_measured_by_faulty_cameras),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -169,7 +169,7 @@ static void a_wandering_gain_is_named(void **state) {
   clt_photometry_report report;
   clt_error error = {0};
   rough_open(&room, 1, (rough_settings){"", "cell_pixels = 2;", ""});
-  wrapped_init(&camera, room.camera, wander, 0.1, 5);
+  wrapped_init(&camera, room.camera, wander, 0.045, 5);
   clt_shots_init(&room.shots, room.projector, &camera.base, room.shots.latency_s, 10, 3);
   assert_ok(clt_photometry_measure(&room.shots, &(clt_photometry_options){.watch_s = -1}, &found, &report, &error),
             error);

@@ -14,6 +14,8 @@
 #define RELATIVE_ERROR 1e-3
 #define FLOOR_ERROR 5e-6
 #define SMOOTHING 1e2
+/* Expected errors from which an equation counts less. */
+#define OUTLYING 8.0
 /* A group's share of pixels at either end of the scale from which its equation is left out. */
 #define CLIPPED_SHARE 1e-3
 #define SATURATED 0.97
@@ -22,7 +24,8 @@ enum {
   NODES = CLT_CURVE_SAMPLES,
   INNER = NODES - 1, /* H_0 = 0 */
   GROUPS = CLT_FIELD_GROUPS * CLT_FIELD_CHANNELS,
-  REFINEMENTS = 4
+  REFINEMENTS = 8,
+  RATE_PASSES = 4
 };
 
 /* Exposures over the shortest. Powers of two alone would leave H undetermined by a factor that is periodic in log2 H.
@@ -89,32 +92,45 @@ static double weight_of(double light) {
   return 1 / (error * error);
 }
 
-/* The rate of one group of one field under a response: weighted least squares over its exposures; 0 where fewer than
- * two are left. */
-static double rate_of(const sight *sights, int exposures, const double *h) {
-  double above = 0, below = 0;
+/* Weights of a group's equations at a rate: by their expected errors, and less the further they are from it (Cauchy),
+ * for a torn frame may be among those of one. Without a rate yet, by their own light. */
+static void weigh(const sight *sights, int exposures, const double *h, double rate, double weight[]) {
+  for (int k = 0; k < exposures; k++) {
+    double light = light_of(&sights[k], h), expected = rate > 0 ? rate * sights[k].seconds : light;
+    double w = weight_of(expected), off = light - expected;
+    weight[k] = sights[k].count > 0 ? w / (1 + w * off * off / (OUTLYING * OUTLYING)) : 0;
+  }
+}
+
+/* The rate of one group of one field under a response, and the weights of its equations; 0 where fewer than two are
+ * left. */
+static double rate_of(const sight *sights, int exposures, const double *h, double weight[]) {
+  double rate = 0;
   int left = 0;
   for (int k = 0; k < exposures; k++) {
-    const sight *s = &sights[k];
-    if (s->count > 0) {
-      double light = light_of(s, h), w = weight_of(light);
-      above += w * s->seconds * light;
-      below += w * s->seconds * s->seconds;
-      left++;
-    }
+    left += sights[k].count > 0;
   }
-  return left >= 2 ? above / below : 0;
+  for (int pass = 0; pass < RATE_PASSES && left >= 2; pass++) {
+    double above = 0, below = 0;
+    weigh(sights, exposures, h, rate, weight);
+    for (int k = 0; k < exposures && sights[k].count >= 0; k++) {
+      above += weight[k] * sights[k].seconds * light_of(&sights[k], h);
+      below += weight[k] * sights[k].seconds * sights[k].seconds;
+    }
+    rate = above / below;
+  }
+  return rate;
 }
 
 /* normal += sum w a a' - (sum w t a)(sum w t a)' / sum w t^2: one group with its rate eliminated. */
 static void add_group(const sight *sights, int exposures, const double *h, double *normal) {
-  double rate = rate_of(sights, exposures, h), below = 0, mixed[NODES] = {0};
+  double weight[CLT_BRACKET_EXPOSURES], rate = rate_of(sights, exposures, h, weight), below = 0, mixed[NODES] = {0};
   if (!(rate > 0)) {
     return;
   }
   for (int k = 0; k < exposures; k++) {
     const sight *s = &sights[k];
-    double w = s->count > 0 ? weight_of(rate * s->seconds) : 0;
+    double w = weight[k];
     below += w * s->seconds * s->seconds;
     for (int i = 0; i < NODES && w > 0; i++) {
       mixed[i] += w * s->seconds * s->hats[i];
@@ -177,23 +193,34 @@ static clt_status refine(const bracket *self, double *h, double *normal, clt_err
   return CLT_OK;
 }
 
-/* Departures from e t: the largest, of full scale, and the rms relative to the light. */
+static int compare_doubles(const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+/* Departures from e t: the largest, of full scale, without the hundredth of them that is larger still; and relative to
+ * the light their deviation, by their median. */
 static double departure(const bracket *self, const double *h, double *relative) {
-  double most = 0, squares = 0, weights = 0;
+  enum { MOST = CLT_BRACKET_FIELDS * GROUPS * CLT_BRACKET_EXPOSURES };
+  double off[MOST], ratio[MOST], weight[CLT_BRACKET_EXPOSURES];
+  int count = 0;
   for (int g = 0; g < self->fields * GROUPS; g++) {
     const sight *sights = self->sights + (ptrdiff_t)g * CLT_BRACKET_EXPOSURES;
-    double rate = rate_of(sights, self->exposures, h);
+    double rate = rate_of(sights, self->exposures, h, weight);
     for (int k = 0; k < self->exposures && rate > 0; k++) {
       if (sights[k].count > 0) {
-        double light = rate * sights[k].seconds, off = light_of(&sights[k], h) - light;
-        most = fmax(most, fabs(off));
-        squares += off * off / (light * light + FLOOR_ERROR);
-        weights += light * light / (light * light + FLOOR_ERROR);
+        double light = rate * sights[k].seconds;
+        off[count] = fabs(light_of(&sights[k], h) - light);
+        ratio[count] = off[count] / (light + sqrt(FLOOR_ERROR));
+        count++;
       }
     }
   }
-  *relative = sqrt(squares / fmax(weights, 1e-30));
-  return most;
+  int kept = count - count / 100;
+  qsort(off, (size_t)count, sizeof *off, compare_doubles);
+  qsort(ratio, (size_t)count, sizeof *ratio, compare_doubles);
+  *relative = count > 0 ? 1.4826 * ratio[count / 2] : 0;
+  return kept > 0 ? off[kept - 1] : 0;
 }
 
 static void cover(const bracket *self, double covered[2]) {

@@ -21,7 +21,7 @@ enum { CLT_BRACKET_FIELDS = 9, CLT_BRACKET_EXPOSURES = 8 };
 typedef struct clt_camera_response {
   clt_curve curve;   /* LINEAR where proportionality holds, else TABLE */
   double proportion; /* largest departure from samples proportional to exposure, of full scale */
-  double residual;   /* rms of what the curve leaves, relative to the light */
+  double residual;   /* deviation of what the curve leaves, relative to the light */
   double covered[2]; /* range of samples seen, fraction of full scale */
 } clt_camera_response;
 

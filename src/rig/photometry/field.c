@@ -29,6 +29,10 @@ clt_status clt_field_bench_init(clt_field_bench *bench, clt_shots *shots, clt_er
     clt_field_bench_finish(bench);
     return clt_fail(error, CLT_FAILED, "out of memory for measuring the responses by %zu pixels", pixels);
   }
+  if (clt_steady_init(&bench->steady, shots, error) != CLT_OK) {
+    clt_field_bench_finish(bench);
+    return CLT_FAILED;
+  }
   for (size_t p = 0; p < pixels; p++) {
     bench->group[p] = 1;
   }
@@ -40,6 +44,7 @@ void clt_field_bench_finish(clt_field_bench *bench) {
   free(bench->codes);
   free(bench->group);
   free(bench->light);
+  clt_steady_finish(&bench->steady);
   *bench = (clt_field_bench){0};
 }
 
@@ -85,14 +90,23 @@ static void add_frame(const clt_field_bench *bench, const clt_frame *frame, clt_
   }
 }
 
+/* The next frame: one that agrees with the others of its field where there are enough to compare. */
+static clt_status next_frame(clt_field_bench *bench, bool compare, int64_t ready_ns, double seconds, clt_frame *frame,
+                             clt_error *error) {
+  return compare ? clt_steady_next(&bench->steady, frame, error)
+                 : clt_shots_take(bench->shots, ready_ns, seconds, frame, error);
+}
+
 clt_status clt_field_take(clt_field_bench *bench, int64_t ready_ns, double seconds, int frames, clt_field_look *look,
                           void *context, clt_field *field, clt_error *error) {
+  bool compare = frames >= CLT_STEADY_HELD;
+  clt_status status = compare ? clt_steady_begin(&bench->steady, ready_ns, seconds, error) : CLT_OK;
   *field = (clt_field){.seconds = 0};
-  for (int n = 0; n < frames; n++) {
+  for (int n = 0; n < frames && status == CLT_OK; n++) {
     clt_frame frame;
-    clt_status status = clt_shots_take(bench->shots, ready_ns, seconds, &frame, error);
+    status = next_frame(bench, compare, ready_ns, seconds, &frame, error);
     if (status != CLT_OK) {
-      return status;
+      break;
     }
     add_frame(bench, &frame, field);
     if (look != NULL) {
@@ -106,7 +120,7 @@ clt_status clt_field_take(clt_field_bench *bench, int64_t ready_ns, double secon
     field->light[c] /= frames;
     field->saturated[c] /= frames;
   }
-  return CLT_OK;
+  return status;
 }
 
 clt_status clt_field_see(clt_field_bench *bench, const double code[CLT_FIELD_CHANNELS], double seconds, int frames,

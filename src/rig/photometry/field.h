@@ -5,19 +5,20 @@
 #define CLT_RIG_PHOTOMETRY_FIELD_H
 
 #include "counterlight/image.h"
-#include "rig/shots.h"
+#include "rig/photometry/steady.h"
 
 enum { CLT_FIELD_CHANNELS = 3, CLT_FIELD_GROUPS = 4 };
 
 /* The bench of photometry. Pixels that are well lit are told apart by their brightness, in groups of equal number. */
 typedef struct clt_field_bench {
   clt_shots *shots; /* not owned */
-  float *codes;     /* of the panel */
-  int channels;     /* of panel and camera */
-  size_t pixels;    /* of the camera */
-  uint8_t *group;   /* of each pixel, 1..CLT_FIELD_GROUPS; 0: not well lit */
-  size_t lit;       /* pixels in all groups */
-  float *light;     /* of every code value, fraction of full scale */
+  clt_steady steady;
+  float *codes;   /* of the panel */
+  int channels;   /* of panel and camera */
+  size_t pixels;  /* of the camera */
+  uint8_t *group; /* of each pixel, 1..CLT_FIELD_GROUPS; 0: not well lit */
+  size_t lit;     /* pixels in all groups */
+  float *light;   /* of every code value, fraction of full scale */
   double black_level;
 } clt_field_bench;
 
@@ -39,7 +40,8 @@ void clt_field_set_response(clt_field_bench *bench, double black_level, const cl
 /* Shows a uniform field; *ready_ns: exposures from then on see it. */
 clt_status clt_field_show(clt_field_bench *bench, const double code[CLT_FIELD_CHANNELS], int64_t *ready_ns,
                           clt_error *error);
-/* Takes the mean over `frames` frames of what is shown, and hands each frame to `look` (which may be NULL). */
+/* Takes the mean over `frames` frames of what is shown, which agree with each other where they are three or more, and
+ * hands each frame to `look` (which may be NULL). */
 typedef void clt_field_look(void *context, const clt_field_bench *bench, const clt_frame *frame);
 clt_status clt_field_take(clt_field_bench *bench, int64_t ready_ns, double seconds, int frames, clt_field_look *look,
                           void *context, clt_field *field, clt_error *error);

@@ -4,7 +4,7 @@
 #include <string.h>
 
 /* Limits from which a measurement becomes a finding. */
-#define RESIDUAL_LIMIT 0.005
+#define RESIDUAL_LIMIT 0.003
 #define ADDITIVITY_LIMIT 0.02
 #define FALL_LIMIT 0.01
 #define DRIFT_LIMIT 0.02
