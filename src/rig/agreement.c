@@ -80,7 +80,9 @@ static size_t check_row(const clt_agreement *agreement, int y, uint8_t *doubtful
     if (isnan(rate[i]) || !apart) {
       continue;
     }
-    bool here = contradict((double)rate[i], (double)rate[j], both, (double)brightest_beside(agreement, x, y));
+    double own = fmax((double)rate[i], (double)rate[j]);
+    bool here = contradict((double)rate[i], (double)rate[j], both, own) &&
+                contradict((double)rate[i], (double)rate[j], both, (double)brightest_beside(agreement, x, y));
     doubtful[i] |= here;
     bad += here;
     if (!open_a && !open_b) {
