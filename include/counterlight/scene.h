@@ -67,6 +67,27 @@ typedef struct clt_effect_report {
  * each a few times to measure it: call it while no device of the scene is in use. */
 CLT_PUBLIC clt_status clt_scene_effects(clt_scene *scene, clt_effect_report reports[CLT_EFFECTS], clt_error *error);
 
+/* What a camera with pixels of its own sees, in shares of its image that add up to 1; all zeros for one whose pixels
+ * are the grid's, k x k a cell. */
+typedef struct clt_pixels_report {
+  bool own;
+  double lit;        /* surfaces where the projector lights them */
+  double shadowed;   /* surfaces in its picture that it does not reach */
+  double outside;    /* surfaces beyond its picture */
+  double nothing;    /* no surface, or the black back of one */
+  double prepare_ms; /* that opening the scene took for tracing the pixels */
+  double frame_ms;   /* that their light takes of a frame, measured */
+  size_t bytes;      /* of memory that it holds */
+} clt_pixels_report;
+/* Measures: call it while no device of the scene is in use. */
+CLT_PUBLIC clt_status clt_scene_pixels(const clt_scene *scene, clt_pixels_report *report, clt_error *error);
+/* The true geometry of a camera with pixels of its own, for tests and references only, of what the middle of each of
+ * its pixels sees: channel 0 of map is x and channel 1 is y of the place in the projector's picture, in cells from its
+ * left and its top (cell k spans k to k + 1), NaN where the projector does not light what is seen; channel 2 is 1 where
+ * it does, 0 where nothing is seen, 2 for a shadow, 3 beyond the projector's picture. map is initialised here.
+ * CLT_BAD_INPUT for a camera whose pixels are the grid's. */
+CLT_PUBLIC clt_status clt_scene_pixel_map(const clt_scene *scene, clt_image *map, clt_error *error);
+
 /* The scene's projector and camera. One of each may be open at a time; both live in the scene's simulated time, which
  * moves on only when one of them is asked for something. The same seed gives the same frames. */
 CLT_PUBLIC clt_status clt_scene_open_projector(clt_scene *scene, clt_projector **out, clt_error *error);

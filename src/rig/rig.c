@@ -87,6 +87,13 @@ static clt_status prepare_rig(clt_camera_rig *rig, clt_error *error) {
   if (status == CLT_OK) {
     status = check_timing(rig, error);
   }
+  if (status == CLT_OK && rig->sensor.own_pixels) {
+    status =
+        clt_fail(error, CLT_BAD_INPUT,
+                 "this camera has pixels of its own: calibrate first; which of its %d x %d pixels see which cell is "
+                 "not known",
+                 rig->sensor.width, rig->sensor.height);
+  }
   if (status == CLT_OK) {
     status = clt_footprints_align(config->width, config->height, rig->sensor.width, rig->sensor.height,
                                   &rig->footprints, error);
