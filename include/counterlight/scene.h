@@ -28,7 +28,8 @@ CLT_PUBLIC void clt_scene_close(clt_scene *scene); /* accepts NULL; after its de
  * scene). Never read on the way from patterns to frames to the acquired T. */
 CLT_PUBLIC const clt_transport *clt_scene_transport(const clt_scene *scene);
 /* The rig settings that an installer would have measured on this scene: grid, response curves, exposures, a latency
- * with margin. */
+ * with margin; not which pixel sees what, so that a rig on a camera with pixels of its own still has to be calibrated.
+ */
 CLT_PUBLIC void clt_scene_rig_config(const clt_scene *scene, clt_rig_config *config);
 /* The exact radiance of every grid cell under a steady drive, black included: b0 + T drive, with what the scene does to
  * the drive before (crosstalk, defocus) and to the radiance after it (subsurface). What changes with time and what the

@@ -4,10 +4,15 @@
 
 #include "sim/cells.h"
 
+/* Columns and rows first <= k <= last of the picture; none where first > last. */
+typedef struct clt_shown_part {
+  int first_column, last_column, first_row, last_row;
+} clt_shown_part;
+
 typedef struct clt_shown {
-  int width, height;
+  int width, height, surfaces;
   int *surface; /* of each cell: the one that most of what the camera sees lit there belongs to; -1: it sees nothing */
-  bool *any;    /* of each surface: some cell shows it */
+  clt_shown_part *part; /* of each surface: around the cells that show it; one more: around those that show any */
 } clt_shown;
 
 /* visibility is of the description's surfaces. shown was zeroed by the caller and is finished by it in either case. */

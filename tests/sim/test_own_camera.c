@@ -285,8 +285,22 @@ static void weights_are_shares(void **state) {
   clt_scene_description_finish(&made);
 }
 
-/* What the projector does not light shows the light, without the projector's own, of the nearest cell of its surface:
- * here of the cell behind whose middle the screen's shadow ends, or at the picture's edge. */
+/* Behind the screen the camera sees nothing of these cells. */
+static bool hidden_by_hand(int cell) {
+  return cell % WIDTH >= 6 && cell % WIDTH <= 9 && (cell / WIDTH == 5 || cell / WIDTH == 6);
+}
+
+static int distance_squared(int cell, int column, int row) {
+  int right = cell % WIDTH - column, down = cell / WIDTH - row;
+  return right * right + down * down;
+}
+
+static int clamped(double value, int count) {
+  return (int)fmin(fmax(value, 0.0), count - 1);
+}
+
+/* What the projector does not light shows the light, without the projector's own, of a cell of its surface nearest to
+ * where the place lies in the picture, or to where it would: none is nearer, by trying them all. */
 static void unlit_borrows_from_the_nearest(void **state) {
   (void)state;
   clt_scene_description made;
@@ -294,21 +308,26 @@ static void unlit_borrows_from_the_nearest(void **state) {
   clt_error error = {.status = CLT_OK};
   describe_shadow(&made);
   assert_ok(clt_view_init(&view, &made, &error), error);
-  int unlit = 0;
+  int shadowed = 0, outside = 0;
   for (int pixel = 0; pixel < 100 * 75; pixel++) {
     double column = pixel % 100 + 0.5, row = pixel / 100 + 0.5;
-    double x = 0.05 + 1.4 * 1.1 * (2 * column / 100 - 1);
-    int first = view.pixels.start[pixel];
-    if (view.pixels.start[pixel + 1] != first + 1 || fate_by_hand(column, row) != CLT_SIGHTLINE_OUTSIDE ||
-        fabs(x) < 3 * 0.44) {
+    int first = view.pixels.start[pixel], nearest = CELLS * CELLS;
+    if (view.pixels.start[pixel + 1] != first + 1 || view.pixels.element[first] < CELLS) {
       continue;
     }
-    int cell = view.pixels.element[first] - CELLS;
-    assert_true(cell >= 0 && cell < CELLS);
-    assert_int_equal(cell % WIDTH, x < 0 ? 0 : WIDTH - 1);
-    unlit++;
+    int found = view.pixels.element[first] - CELLS;
+    double x = 0.05 + 1.4 * 1.1 * (2 * column / 100 - 1), z = 0.02 + 1.4 * 0.9 * (1 - 2 * row / 75);
+    int i = clamped(WIDTH * 0.5 * (1 + x / (3 * 0.44)), WIDTH),
+        j = clamped(HEIGHT * 0.5 * (1 - z / (3 * 0.33)), HEIGHT);
+    for (int cell = 0; cell < CELLS; cell++) {
+      nearest = hidden_by_hand(cell) ? nearest : (int)fmin(nearest, distance_squared(cell, i, j));
+    }
+    assert_false(hidden_by_hand(found));
+    assert_int_equal(distance_squared(found, i, j), nearest);
+    shadowed += fate_by_hand(column, row) == CLT_SIGHTLINE_SHADOWED && nearest > 0;
+    outside += fate_by_hand(column, row) == CLT_SIGHTLINE_OUTSIDE;
   }
-  assert_true(unlit > 100);
+  assert_true(shadowed > 100 && outside > 100);
   clt_view_finish(&view);
   clt_scene_description_finish(&made);
 }
