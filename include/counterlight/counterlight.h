@@ -6,6 +6,7 @@
 #include "counterlight/acquire.h"
 #include "counterlight/analysis.h"
 #include "counterlight/device.h"
+#include "counterlight/forward.h"
 #include "counterlight/image.h"
 #include "counterlight/rig.h"
 #include "counterlight/scene.h"

@@ -48,7 +48,7 @@ static clt_status fill(montecarlo *of, clt_matrix *matrix, clt_error *error) {
   }
   of->cell = matrix->cell;
   matrix->cell = NULL;
-  return clt_paths_init(&of->paths, matrix, error);
+  return clt_paths_init(&of->paths, matrix, "eq. 48 needs m < 1/2; use direct or auto", error);
 }
 
 static clt_status prepare_kind(clt_system *system, bool hybrid, void **prepared, clt_error *error) {
@@ -107,7 +107,7 @@ static void apply(void *context, const double *r, double *d) {
   if (of->hybrid) {
     clt_paths_hybrid(&of->paths, of->in, of->samples, count_steps(of->paths.ratio), key, of->last, of->out);
   } else {
-    clt_paths_estimate(&of->paths, of->in, of->samples, key, of->out);
+    clt_paths_estimate(&of->paths, of->in, of->samples, key, of->out, NULL);
   }
   for (size_t k = 0; k < of->paths.count; k++) {
     d[of->cell[k]] = of->out[k];
