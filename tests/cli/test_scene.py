@@ -16,6 +16,10 @@ CALLED_FOR = {"dihedral": INDIRECT, "corner": INDIRECT, "small": INDIRECT, "flat
               "box3": INDIRECT, "box4": INDIRECT, "box5": INDIRECT, "box6": INDIRECT, "cornell": HIDDEN, "dome": HIDDEN,
               "gallery": HIDDEN, "own_camera": HIDDEN, "shadow": HIDDEN, "stage": HIDDEN,
               "glossy": GLOSSY, "highlight": HIDDEN | GLOSSY}
+CALLED_FOR = {"book": INDIRECT, "dihedral": INDIRECT, "corner": INDIRECT, "small": INDIRECT, "flat": set(),
+              "box2": INDIRECT, "box3": INDIRECT, "box4": INDIRECT, "box5": INDIRECT, "box6": INDIRECT,
+              "cornell": HIDDEN, "dome": HIDDEN, "gallery": HIDDEN, "shadow": HIDDEN, "stage": HIDDEN, "glossy": GLOSSY,
+              "highlight": HIDDEN | GLOSSY}
 
 
 def explain(path, *options):

@@ -11,7 +11,7 @@
 #include "tradeoff/reproduce/cube.h"
 #include "tradeoff/reproduce/figures.h"
 
-static const double WANTED = 0.01;
+static const double WANTED = 0.01, REPORT_UNIT_MS = 0.557;
 enum { GROWTH_FROM = 5120, ALL_METHODS_UP_TO = 2048 };
 static const double ALBEDO[CLT_CUBE_SIDES] = {0.4, 0.4, 0.4, 0.4, 0.4, 0.4};
 
@@ -110,7 +110,8 @@ static void fill_reflected(const room *of, float *reflected) {
 
 /* The report's baseline: eq. 16 by products of matrices, term after term until the error is below 1 %. work: four
  * matrices. */
-static void sum_series(const room *of, float *work, double *light, outcome *found) {
+static clt_status sum_series(const clt_reproduce_options *options, const room *of, float *work, double *light,
+                             outcome *found, clt_error *error) {
   enum { TERMS_MAX = 40 };
   size_t square = of->cells * of->cells;
   blasint side = (blasint)of->cells;
@@ -123,7 +124,8 @@ static void sum_series(const room *of, float *work, double *light, outcome *foun
     sum[i * of->cells + i] = 1.0f;
   }
   found->error = 1.0;
-  for (int n = 1; n <= TERMS_MAX && found->error > WANTED; n++) {
+  clt_status status = CLT_OK;
+  for (int n = 1; n <= TERMS_MAX && found->error > WANTED && status == CLT_OK; n++) {
     float sign = n % 2 == 0 ? 1.0f : -1.0f;
     for (size_t k = 0; k < square; k++) {
       sum[k] += sign * power[k];
@@ -135,7 +137,8 @@ static void sum_series(const room *of, float *work, double *light, outcome *foun
       }
     }
     found->error = error_of(of, light);
-    if (found->error > WANTED) {
+    status = clt_figure_step(options, error, "Fig. 10, N = %zu: series, term %d", of->cells, n);
+    if (found->error > WANTED && status == CLT_OK) {
       cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, side, side, side, 1.0f, power, side, reflected, side, 0.0f,
                   next, side);
       float *swap = power;
@@ -143,14 +146,15 @@ static void sum_series(const room *of, float *work, double *light, outcome *foun
     }
   }
   found->ms = 1e3 * clt_clock_since(start_ns);
+  return status;
 }
 
-static clt_status run_series(const room *of, outcome *found, clt_error *error) {
+static clt_status run_series(const clt_reproduce_options *options, const room *of, outcome *found, clt_error *error) {
   float *work = clt_alloc(4 * of->cells, of->cells * sizeof *work);
   double *light = clt_alloc(of->cells, sizeof *light);
   clt_status status = CLT_OK;
   if (work != NULL && light != NULL) {
-    sum_series(of, work, light, found);
+    status = sum_series(options, of, work, light, found, error);
   } else {
     status = clt_fail(error, CLT_FAILED, "not enough memory for the series of %zu patches; ask for a smaller ladder",
                       of->cells);
@@ -162,7 +166,8 @@ static clt_status run_series(const room *of, outcome *found, clt_error *error) {
 
 /* Solves until a tolerance brings the error of l_d below 1 %; the fastest of some solves counts. */
 static clt_status run_method(const room *of, const char *method, outcome *found, clt_error *error) {
-  enum { REPEATS = 5, TOLERANCES = 5 };
+  enum { REPEATS = 5, REPEATS_MAX = 500, TOLERANCES = 5 };
+  static const double LONG_S = 0.2; /* of solves: enough to meet one that nothing else disturbs */
   double tolerance = WANTED;
   clt_status status = CLT_OK;
   *found = (outcome){.error = 1.0, .ms = INFINITY};
@@ -172,7 +177,8 @@ static clt_status run_method(const room *of, const char *method, outcome *found,
     clt_solve_result result = {0};
     status = clt_solver_create(of->transport, of->certificate, &options, &solver, error);
     found->ms = INFINITY;
-    for (int k = 0; k < REPEATS && status == CLT_OK; k++) {
+    int64_t start_ns = clt_clock_ns();
+    for (int k = 0; k < REPEATS_MAX && status == CLT_OK && (k < REPEATS || clt_clock_since(start_ns) < LONG_S); k++) {
       status = clt_solver_run(solver, of->seen, NULL, of->drive, &result, error);
       found->ms = fmin(found->ms, 1e3 * result.method_seconds);
     }
@@ -214,12 +220,17 @@ typedef struct ladder {
   outcome series, iterative, wavelet, best; /* of the last rung */
 } ladder;
 
-static clt_status climb(ladder *on, const struct rung *rung, clt_error *error) {
-  static const double report_unit_ms = 0.557;
+static clt_status climb(const clt_reproduce_options *options, ladder *on, const struct rung *rung, clt_error *error) {
   room of = {0};
-  clt_status status = room_init(&of, rung, error);
+  clt_status status = clt_figure_step(options, error, "Fig. 10, N = %d: the box", rung->cells);
   if (status == CLT_OK) {
-    status = run_series(&of, &on->series, error);
+    status = room_init(&of, rung, error);
+  }
+  if (status == CLT_OK) {
+    status = run_series(options, &of, &on->series, error);
+  }
+  if (status == CLT_OK) {
+    status = clt_figure_step(options, error, "Fig. 10, N = %d: iterations", rung->cells);
   }
   if (status == CLT_OK) {
     status = run_method(&of, "jacobi", &on->iterative, error);
@@ -238,9 +249,9 @@ static clt_status climb(ladder *on, const struct rung *rung, clt_error *error) {
   for (int k = 0; k < 4; k++) {
     clt_chart_point(&on->chart.lines[k], cells, ms[k]);
   }
-  clt_chart_point(&on->chart.lines[4], cells, rung->series * report_unit_ms);
-  clt_chart_point(&on->chart.lines[5], cells, rung->iterative * report_unit_ms);
-  clt_chart_point(&on->chart.lines[6], cells, rung->wavelet * report_unit_ms);
+  clt_chart_point(&on->chart.lines[4], cells, rung->series * REPORT_UNIT_MS);
+  clt_chart_point(&on->chart.lines[5], cells, rung->iterative * REPORT_UNIT_MS);
+  clt_chart_point(&on->chart.lines[6], cells, rung->wavelet * REPORT_UNIT_MS);
   room_finish(&of);
   return status;
 }
@@ -253,8 +264,11 @@ static void judge(const ladder *on, const struct rung *last, clt_reproduction *o
            last->iterative / last->wavelet, last->cells);
   clt_reproduced_add(out, "Fig. 10, wavelet", text, wavelet >= last->iterative / last->wavelet,
                      "%.3g times (%.3g ms; made ready in %.3g s)", wavelet, on->wavelet.ms, on->wavelet.prepare_s);
-  clt_reproduced_add(out, "Fig. 10, best of both", "its best is the wavelet method", on->best.ms <= on->wavelet.ms,
-                     "%s: %.3g ms to %.2g %% (made ready in %.3g s)", on->best_method, on->best.ms,
+  snprintf(text, sizeof text, "its best, the wavelets, takes %.3g ms at N = %d", last->wavelet * REPORT_UNIT_MS,
+           last->cells);
+  clt_reproduced_add(out, "Fig. 10, best", text,
+                     on->best.ms < last->wavelet * REPORT_UNIT_MS && on->best.error <= WANTED,
+                     "the best here, %s, takes %.3g ms to %.2g %% (made ready in %.3g s)", on->best_method, on->best.ms,
                      100 * on->best.error, on->best.prepare_s);
   if (last->cells < GROWTH_FROM) { /* what the report says of large sizes */
     return;
@@ -272,16 +286,19 @@ static void judge(const ladder *on, const struct rung *last, clt_reproduction *o
 static clt_status compute(const clt_reproduce_options *options, clt_reproduction *out, clt_error *error) {
   static const char *const lines[] = {"series",         "iteration",         "wavelet",        "best method",
                                       "report: series", "report: iteration", "report: wavelet"};
+  enum { OURS = 4 };
   int largest = options->largest > 0 ? options->largest : rungs[RUNGS - 1].cells, last = 0;
   ladder on = {
       .chart = {
           .title = "Time to an error of 1 %", .across = "patches N", .up = "ms", .log_across = true, .log_up = true}};
   clt_status status = CLT_OK;
   for (size_t k = 0; k < sizeof lines / sizeof lines[0]; k++) {
-    clt_chart_add(&on.chart, "%s", lines[k]);
+    clt_chart_line *line = clt_chart_add(&on.chart, "%s", lines[k]);
+    line->dashed = k >= OURS;
+    line->colour = (int)(k >= OURS ? k - OURS : k);
   }
   for (int k = 0; k < RUNGS && rungs[k].cells <= largest && status == CLT_OK; k++) {
-    status = climb(&on, &rungs[k], error);
+    status = climb(options, &on, &rungs[k], error);
     last = k;
   }
   if (status == CLT_OK) {
@@ -295,5 +312,5 @@ const clt_figure clt_figure_ladder = {
     .name = "Fig. 10",
     .caption = "Series, iteration and wavelets as the transport grows, all to an error of 1 %, beside the report's "
                "times (Matlab, 2010) and the best method here. Making a method ready is not counted, as there.",
-    .files = {"fig10.svg"},
+    .files = {{"fig10.svg", "Time to 1 %, lines of this machine solid, the report's dashed.", true}},
     .compute = compute};
