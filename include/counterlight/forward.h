@@ -52,7 +52,8 @@ typedef struct clt_forward_result {
 } clt_forward_result;
 
 /* light = l_d + A l_d + ... + A^n l_d, n = bounces in 0..1000000 (eq. 14): n products, and up to 8 for the norm.
- * CLT_BAD_INPUT where norm >= 1: light would not settle; and for light that is not finite. result may be NULL. */
+ * CLT_BAD_INPUT where norm >= 1, or where a bounce grows all the same (an A with negative entries): light would not
+ * settle; and for light that is not finite. result may be NULL. */
 CLT_PUBLIC clt_status clt_forward_series(const clt_bounce_operator *bounce, const double *direct, int bounces,
                                          double *light, clt_forward_result *result, clt_error *error);
 

@@ -244,6 +244,31 @@ static void light_that_would_not_settle_is_refused(void **state) {
   }
 }
 
+/* A with negative entries whose even light fades and whose uneven light grows: the bound does not see it, the bounces
+ * do. */
+static void bounces_that_grow_are_noticed(void **state) {
+  (void)state;
+  enum { COUNT = 12 };
+  static const double radii[] = {1.1, 1.3, 2};
+  for (int n = 0; n < 3; n++) {
+    double matrix[COUNT * COUNT], direct[COUNT], light[COUNT];
+    uint64_t seed = (uint64_t)n + 1;
+    for (size_t k = 0; k < (size_t)COUNT * COUNT; k++) { /* .9 for even light, -radius for the rest */
+      matrix[k] = (0.9 + radii[n]) / COUNT - (k % (COUNT + 1) == 0 ? radii[n] : 0);
+    }
+    for (int i = 0; i < COUNT; i++) {
+      direct[i] = test_random(&seed);
+    }
+    clt_bounce_entries entries = {COUNT, matrix};
+    clt_bounce_operator bounce = clt_bounce_operator_of_entries(&entries);
+    clt_error error = {0};
+    assert_int_equal(clt_forward_series(&bounce, direct, 40, light, NULL, &error), CLT_BAD_INPUT);
+    assert_non_null(strstr(error.message, "||A|| is not below 1"));
+    assert_int_equal(clt_forward_iterate(&bounce, direct, 1e-6, light, NULL, &error), CLT_BAD_INPUT);
+    assert_non_null(strstr(error.message, "||A|| is not below 1"));
+  }
+}
+
 static void what_cannot_be_asked_is_refused(void **state) {
   (void)state;
   problem of;
@@ -276,6 +301,7 @@ int main(void) {
       cmocka_unit_test(a_measured_room_leads_back_to_its_transport),
       cmocka_unit_test(paths_are_unbiased_and_know_their_error),
       cmocka_unit_test(light_that_would_not_settle_is_refused),
+      cmocka_unit_test(bounces_that_grow_are_noticed),
       cmocka_unit_test(what_cannot_be_asked_is_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
