@@ -96,6 +96,16 @@ clt_status clt_interreflection_entries(clt_interreflection *op, int channel, dou
   return status;
 }
 
+clt_status clt_bounce_check(const double *values, size_t count, clt_error *error) {
+  for (size_t i = 0; i < count; i++) {
+    if (!isfinite(values[i])) {
+      return clt_fail(error, CLT_BAD_INPUT, "A makes light of %g at value %zu; its entries must be finite numbers",
+                      values[i], i);
+    }
+  }
+  return CLT_OK;
+}
+
 /* For A >= 0 and u > 0, max (A u)_i / u_i is ||A|| in the norm max |l_i| / u_i, and at least rho(A). */
 clt_status clt_bounce_norm(const clt_bounce_operator *bounce, double *u, double *scratch, double *norm,
                            clt_error *error) {
@@ -107,6 +117,7 @@ clt_status clt_bounce_norm(const clt_bounce_operator *bounce, double *u, double 
   for (int step = 0; step < POWER_STEPS && status == CLT_OK; step++) {
     double most = 0;
     status = bounce->apply(bounce->context, u, scratch, error);
+    status = status == CLT_OK ? clt_bounce_check(scratch, bounce->count, error) : status;
     for (size_t i = 0; i < bounce->count && status == CLT_OK; i++) {
       most = fmax(most, fabs(scratch[i]) / u[i]);
     }

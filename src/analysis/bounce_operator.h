@@ -8,6 +8,8 @@
  */
 clt_status clt_bounce_norm(const clt_bounce_operator *bounce, double *u, double *scratch, double *norm,
                            clt_error *error);
+/* CLT_BAD_INPUT where A has made a value that is not finite. */
+clt_status clt_bounce_check(const double *values, size_t count, clt_error *error);
 /* CLT_BAD_INPUT where a value of `direct` is not finite. */
 clt_status clt_forward_check(const clt_bounce_operator *bounce, const double *direct, clt_error *error);
 

@@ -25,6 +25,7 @@ static clt_status fill(const clt_bounce_operator *bounce, clt_matrix *matrix, cl
   for (size_t i = 0; i < count && status == CLT_OK; i++) {
     double *row = matrix->entries + i * count;
     status = bounce->row(bounce->context, i, row, error);
+    status = status == CLT_OK ? clt_bounce_check(row, count, error) : status;
     for (size_t j = 0; j < count; j++) {
       row[j] = (i == j) - row[j];
     }

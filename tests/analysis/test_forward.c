@@ -291,6 +291,11 @@ static void what_cannot_be_asked_is_refused(void **state) {
   assert_int_equal(clt_forward_paths_estimate(paths, of.direct, 9, 1, of.light, NULL, &error), CLT_BAD_INPUT);
   clt_forward_paths_destroy(paths);
   clt_forward_paths_destroy(NULL);
+  of.direct[2] = 1;
+  of.room.exchange[3] = NAN;
+  assert_int_equal(clt_forward_series(&of.bounce, of.direct, 1, of.light, NULL, &error), CLT_BAD_INPUT);
+  assert_non_null(strstr(error.message, "finite"));
+  assert_int_equal(clt_forward_paths_create(&of.bounce, &paths, &error), CLT_BAD_INPUT);
   problem_finish(&of);
 }
 
