@@ -14,7 +14,7 @@ enum { DIVISION = 16, SHOWN = 9, CHANNELS = CLT_VIEW_CHANNELS, SIDES = CLT_VIEW_
 static void add_term(const clt_cube *cube, int channel, double *estimate, double *term, double *scratch) {
   double *lit = scratch + 2 * cube->cells;
   memcpy(lit, term, cube->cells * sizeof *lit);
-  clt_cube_illuminate(cube, clt_view_albedo[channel], lit, scratch);
+  clt_cube_illuminate(cube, clt_room_view_albedo[channel], lit, scratch);
   for (size_t i = 0; i < cube->cells; i++) {
     term[i] -= lit[i];
     estimate[i] += term[i];
@@ -40,8 +40,8 @@ static double mean_error(const clt_cube *cube, const double *estimate, const dou
 }
 
 /* direct, estimate and term: CHANNELS * cells values each; scratch: 3 * cells. */
-static void run_series(const clt_cube *cube, const clt_view *view, double *direct, double *scratch, clt_image *strip,
-                       clt_reproduction *out) {
+static void run_series(const clt_cube *cube, const clt_room_view *view, double *direct, double *scratch,
+                       clt_image *strip, clt_reproduction *out) {
   size_t cells = cube->cells, values = CHANNELS * cells;
   double *estimate = direct + values, *term = estimate + values, before = 0.0, error = 1.0;
   bool alternates = true;
@@ -49,21 +49,21 @@ static void run_series(const clt_cube *cube, const clt_view *view, double *direc
   for (int c = 0; c < CHANNELS; c++) {
     double *of = estimate + (size_t)c * cells;
     for (size_t i = 0; i < cells; i++) {
-      direct[(size_t)c * cells + i] = of[i] = clt_view_albedo[c][i / (cells / SIDES)];
+      direct[(size_t)c * cells + i] = of[i] = clt_room_view_albedo[c][i / (cells / SIDES)];
     }
-    clt_cube_illuminate(cube, clt_view_albedo[c], of, scratch);
+    clt_cube_illuminate(cube, clt_room_view_albedo[c], of, scratch);
   }
   memcpy(term, estimate, values * sizeof *term);
-  clt_view_paint(view, direct, 0.0, 0.8, 0, 0, strip);
-  clt_view_paint(view, direct, 0.5, 0.0, 0, 1, strip);
+  clt_room_view_paint(view, direct, 0.0, 0.8, 0, 0, strip);
+  clt_room_view_paint(view, direct, 0.5, 0.0, 0, 1, strip);
   for (int n = 0; n < SHOWN - 1; n++) {
     double now = mean_error(cube, estimate, direct);
     alternates = alternates && (n == 0 || now * before < 0.0);
     before = now;
     error = relative_error(estimate, direct, values);
     needed = needed < 0 && error < 0.02 ? n : needed;
-    clt_view_paint(view, estimate, 0.0, 0.8, n + 1, 0, strip);
-    clt_view_paint(view, term, n > 0 ? 0.5 : 0.0, n > 0 ? 1.0 : 0.8, n + 1, 1, strip);
+    clt_room_view_paint(view, estimate, 0.0, 0.8, n + 1, 0, strip);
+    clt_room_view_paint(view, term, n > 0 ? 0.5 : 0.0, n > 0 ? 1.0 : 0.8, n + 1, 1, strip);
     for (int c = 0; c < CHANNELS; c++) {
       add_term(cube, c, estimate + (size_t)c * cells, term + (size_t)c * cells, scratch);
     }
@@ -76,12 +76,12 @@ static void run_series(const clt_cube *cube, const clt_view *view, double *direc
 
 static clt_status compute(const clt_reproduce_options *options, clt_reproduction *out, clt_error *error) {
   clt_cube cube = {0};
-  clt_view view = {0};
+  clt_room_view view = {0};
   clt_image strip = {0};
   double *vectors = NULL;
   clt_status status = clt_cube_init(&cube, SIDES, DIVISION, DIVISION, error);
   if (status == CLT_OK) {
-    status = clt_view_init(&view, &cube, error);
+    status = clt_room_view_init(&view, &cube, error);
   }
   if (status == CLT_OK) {
     vectors = clt_alloc((3 * CHANNELS + 3) * cube.cells, sizeof *vectors);
@@ -94,7 +94,7 @@ static clt_status compute(const clt_reproduce_options *options, clt_reproduction
   }
   clt_image_finish(&strip);
   free(vectors);
-  clt_view_finish(&view);
+  clt_room_view_finish(&view);
   clt_cube_finish(&cube);
   return status;
 }

@@ -125,7 +125,7 @@ static clt_status draw(study *of, int way, int channel, clt_error *error) {
 static clt_status run_channel(study *of, int channel, clt_error *error) {
   size_t cells = of->cells, each = cells / CLT_VIEW_SIDES;
   blasint count = (blasint)cells;
-  const double *albedo = clt_view_albedo[channel];
+  const double *albedo = clt_room_view_albedo[channel];
   double *direct = of->right[INVERSE] + (size_t)channel * cells, *seen = of->right[FORWARD] + (size_t)channel * cells;
   clt_status status = clt_cube_solve(&of->cube, albedo, of->matrix, error);
   if (status == CLT_OK) {
@@ -199,21 +199,21 @@ static clt_status plot(const study *of, const char *folder, clt_error *error) {
 }
 
 static clt_status paint(const study *of, const char *folder, clt_error *error) {
-  clt_view view = {0};
+  clt_room_view view = {0};
   clt_image strip = {0};
-  clt_status status = clt_view_init(&view, &of->cube, error);
+  clt_status status = clt_room_view_init(&view, &of->cube, error);
   if (status == CLT_OK) {
     status = clt_image_init(&strip, CHANNELS, LINES * CLT_VIEW_PIXELS, COLUMNS * CLT_VIEW_PIXELS, error);
   }
   for (int k = 0; k < LINES * COLUMNS && status == CLT_OK; k++) {
     const double *light = of->shown + (size_t)k * CHANNELS * of->cells;
-    clt_view_paint(&view, light, 0.0, 0.8, k % COLUMNS, k / COLUMNS, &strip);
+    clt_room_view_paint(&view, light, 0.0, 0.8, k % COLUMNS, k / COLUMNS, &strip);
   }
   if (status == CLT_OK) {
     status = clt_figure_picture(folder, "fig11.png", &strip, error);
   }
   clt_image_finish(&strip);
-  clt_view_finish(&view);
+  clt_room_view_finish(&view);
   return status;
 }
 

@@ -5,7 +5,7 @@
 
 #include "base/memory.h"
 
-const double clt_view_albedo[CLT_VIEW_CHANNELS][CLT_CUBE_SIDES] = {
+const double clt_room_view_albedo[CLT_VIEW_CHANNELS][CLT_CUBE_SIDES] = {
     {0.55, 0.6, 0.55, 0.1, 0.55}, {0.55, 0.1, 0.55, 0.5, 0.55}, {0.55, 0.1, 0.55, 0.1, 0.55}};
 
 /* The eye stands before the open front. */
@@ -16,7 +16,7 @@ static int seen_patch(const clt_cube *cube, int row, int column) {
   return clt_first_hit(cube->patches, (int)cube->cells, eye, direction, -1).surface;
 }
 
-clt_status clt_view_init(clt_view *view, const clt_cube *cube, clt_error *error) {
+clt_status clt_room_view_init(clt_room_view *view, const clt_cube *cube, clt_error *error) {
   view->cells = cube->cells;
   view->patch = clt_alloc((size_t)CLT_VIEW_PIXELS * CLT_VIEW_PIXELS, sizeof *view->patch);
   if (view->patch == NULL) {
@@ -29,13 +29,13 @@ clt_status clt_view_init(clt_view *view, const clt_cube *cube, clt_error *error)
   return CLT_OK;
 }
 
-void clt_view_finish(clt_view *view) {
+void clt_room_view_finish(clt_room_view *view) {
   free(view->patch);
-  *view = (clt_view){0};
+  *view = (clt_room_view){0};
 }
 
-void clt_view_paint(const clt_view *view, const double *light, double offset, double gain, int column, int line,
-                    clt_image *strip) {
+void clt_room_view_paint(const clt_room_view *view, const double *light, double offset, double gain, int column,
+                         int line, clt_image *strip) {
   size_t width = (size_t)strip->width, picture = (size_t)strip->height * width;
   for (size_t k = 0; k < (size_t)CLT_VIEW_PIXELS * CLT_VIEW_PIXELS; k++) {
     size_t row = (size_t)line * CLT_VIEW_PIXELS + k / CLT_VIEW_PIXELS;
