@@ -8,6 +8,7 @@
 #include "counterlight/device.h"
 #include "counterlight/forward.h"
 #include "counterlight/image.h"
+#include "counterlight/loop.h"
 #include "counterlight/rig.h"
 #include "counterlight/scene.h"
 #include "counterlight/solve.h"
