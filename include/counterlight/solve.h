@@ -33,7 +33,8 @@ typedef struct clt_channel_certificate {
  * radius_low with R as it stands, whose noise averages out), flux weights w such that S diag(w) is nearest to
  * symmetric, dark cells from F (below 1e-3 of the 90th percentile) and the transport's sigma (below 5 of them). Where
  * rows != cols there is no diagonal: a column's sum stands for F, and radius_high, norm_high and reciprocity are
- * infinite (not known). */
+ * infinite (not known). CLT_BAD_INPUT where a value that takes part is not a number, and where no cell shows its own
+ * light though light goes elsewhere (a mirror, rows out of order). */
 CLT_PUBLIC clt_status clt_certify(const clt_transport *transport, clt_certificate **out, clt_error *error);
 CLT_PUBLIC void clt_certificate_destroy(clt_certificate *certificate);
 CLT_PUBLIC const clt_channel_certificate *clt_certificate_channel(const clt_certificate *certificate, int channel);

@@ -219,6 +219,31 @@ static clt_status check_finite(clt_system *system, int c, clt_error *error) {
   return CLT_OK;
 }
 
+/* A T whose cells all send their light elsewhere (a mirror, or rows in another order than the columns) looks black on
+ * its diagonal, but is not. */
+static clt_status check_matched(clt_system *system, int c, const clt_channel_certificate *channel,
+                                const double *first_bounce, clt_error *error) {
+  double *ones = clt_system_vector(system, 0), *sums = clt_system_vector(system, 1), most = 0;
+  if (!system->square || channel->lit > 0) {
+    return CLT_OK;
+  }
+  for (size_t i = 0; i < system->rows; i++) {
+    ones[i] = isfinite(first_bounce[i]) ? 1 : 0;
+  }
+  clt_transport_apply_transposed(system->transport, c, ones, sums);
+  for (size_t j = 0; j < system->cols; j++) {
+    most = fmax(most, sums[j] - (isfinite(first_bounce[j]) ? first_bounce[j] : 0));
+  }
+  if (most > 0 && clt_transport_sigma(system->transport, c) == NULL) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "no cell of channel %d shows its own light, but light of up to %.3g goes elsewhere: a mirror, or "
+                    "rows in another order than the columns; put the rows in order, or add one of zeros to the T so "
+                    "that lsmr or bounded take it",
+                    c, most);
+  }
+  return CLT_OK;
+}
+
 static clt_status certify_channel(clt_certificate *certificate, clt_system *system, int c, clt_error *error) {
   clt_channel_certificate *channel = &certificate->channel[c];
   size_t at = (size_t)c * system->cols;
@@ -229,7 +254,8 @@ static clt_status certify_channel(clt_certificate *certificate, clt_system *syst
   channel->dark = system->cols - channel->lit;
   channel->white = quantile(first_bounce, lit, system->cols, 0.5, system->drive);
   clt_system_select(system, c, first_bounce, lit);
-  clt_status status = check_finite(system, c, error);
+  clt_status status = check_matched(system, c, channel, first_bounce, error);
+  status = status == CLT_OK ? check_finite(system, c, error) : status;
   if (status != CLT_OK) {
     return status;
   }
