@@ -213,11 +213,9 @@ static void divergence_is_refused(void **state) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(iterations_in_a_closed_cube),
-                                     cmocka_unit_test(a_room_that_loses_one_percent),
-                                     cmocka_unit_test(series_iteration_and_matrix_agree),
-                                     cmocka_unit_test(all_reach_the_direct_solution),
-                                     cmocka_unit_test(lsmr_is_least_squares_of_least_norm),
-                                     cmocka_unit_test(divergence_is_refused)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(iterations_in_a_closed_cube),         cmocka_unit_test(a_room_that_loses_one_percent),
+      cmocka_unit_test(series_iteration_and_matrix_agree),   cmocka_unit_test(all_reach_the_direct_solution),
+      cmocka_unit_test(lsmr_is_least_squares_of_least_norm), cmocka_unit_test(divergence_is_refused)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
