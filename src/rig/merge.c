@@ -97,22 +97,25 @@ static double variance_at(const clt_merge *merge, const clt_merge_sum *sum, doub
   return sample / (t * t * sum->count);
 }
 
-/* The rate that some exposure proves at the least. */
+/* The rate that two exposures prove at the least; 0 where only one shows light, which may be a frame of another
+ * pattern.
+ */
 static double proven_rate(const clt_merge *merge, const clt_merge_sum *sums, size_t stride) {
-  double proven = 0;
+  double most = 0, second = 0;
   for (int k = 0; k < merge->exposures; k++) {
     const clt_merge_sum *sum = &sums[(size_t)k * stride];
     double t = merge->seconds[k];
     if (sum->count > 0) {
-      double e = sum->light / t;
-      proven = fmax(proven, e - DEVIATIONS * sqrt(variance_at(merge, sum, t, e)));
+      double e = sum->light / t, proven = e - DEVIATIONS * sqrt(variance_at(merge, sum, t, e));
+      second = fmax(second, fmin(most, proven));
+      most = fmax(most, proven);
     }
   }
-  return proven;
+  return second;
 }
 
-/* An exposure counts where it is neither saturated nor dead: without light where another proves that there was some
- * (a shutter or a lamp that failed). */
+/* An exposure counts where it is neither saturated nor dead: without light where two others prove that there was
+ * some (a shutter or a lamp that failed). */
 static bool counts(const clt_merge *merge, const clt_merge_sum *sum, double t, double proven) {
   if (sum->count == 0) {
     return false;

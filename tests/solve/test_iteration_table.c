@@ -93,8 +93,17 @@ static int needed(table_room *room, const clt_method *method, int most) {
   return high;
 }
 
-static void assert_count(const char *name, int got, int wanted, double share) {
-  if (abs(got - wanted) > fmax(1, share * wanted)) {
+/* The count is within one iteration, or within a share, of the table's. */
+static void assert_count(const char *name, table_room *room, const clt_method *method, int wanted, double share) {
+  int slack = (int)fmax(1, share * wanted), most = wanted + slack, least = wanted - slack;
+  if (most > 100) { /* two runs tell that it lies between */
+    assert_true(error_after(room, method, most) <= 1e-3 && error_after(room, method, least - 1) > 1e-3);
+    print_message("  %s %d to %d\n", name, least, most);
+    return;
+  }
+  int got = needed(room, method, most);
+  print_message("  %s %d\n", name, got);
+  if (got < least || got > most) {
     fail_msg("%s took %d iterations, wanted %d", name, got, wanted);
   }
 }
@@ -110,24 +119,21 @@ static void the_table_of_a_random_picture(void **state) {
   for (size_t k = 0; k < 4; k++) {
     table_room *room = calloc(1, sizeof *room);
     open_room(room, rows[k].albedo, k + 1, false);
-    for (uint64_t seed = 1; seed <= (k < 3 ? 3 : 1); seed++) {
+    for (uint64_t seed = 1; seed <= (k < 3 ? 2 : 1); seed++) {
       double wanted[CELLS];
       uint64_t random = seed;
       for (size_t i = 0; i < CELLS; i++) {
         wanted[i] = test_random(&random);
       }
       ask(room, wanted);
-      int jacobi = rows[k].jacobi > 0 ? needed(room, &clt_method_jacobi, 60) : 0;
-      int damped = needed(room, &clt_method_damped, k < 3 ? 90 : 600);
-      int chebyshev = needed(room, &clt_method_chebyshev, 80);
-      int pcg = needed(room, &clt_method_pcg, 20), gmres = needed(room, &clt_method_gmres, 20);
-      print_message("albedo %g: jacobi %d, damped %d, chebyshev %d, pcg %d, gmres %d\n", rows[k].albedo, jacobi, damped,
-                    chebyshev, pcg, gmres);
-      assert_count("jacobi", jacobi, rows[k].jacobi, .1);
-      assert_count("damped", damped, rows[k].damped, .1);
-      assert_count("chebyshev", chebyshev, rows[k].chebyshev, 0);
-      assert_count("pcg", pcg, rows[k].gradients, 0);
-      assert_count("gmres", gmres, rows[k].gradients, 0);
+      print_message("albedo %g\n", rows[k].albedo);
+      if (rows[k].jacobi > 0) {
+        assert_count("jacobi", room, &clt_method_jacobi, rows[k].jacobi, .1);
+      }
+      assert_count("damped", room, &clt_method_damped, rows[k].damped, .1);
+      assert_count("chebyshev", room, &clt_method_chebyshev, rows[k].chebyshev, 0);
+      assert_count("pcg", room, &clt_method_pcg, rows[k].gradients, 0);
+      assert_count("gmres", room, &clt_method_gmres, rows[k].gradients, 0);
     }
     close_room(room);
     free(room);
@@ -139,18 +145,16 @@ static void the_table_of_a_random_picture(void **state) {
 static void the_table_of_gauss_seidel(void **state) {
   (void)state;
   const double albedos[] = {.45, .62, .9, .99};
-  const int table[] = {4, 7, 54, 501};
+  const int table[] = {4, 7, 54};
   for (size_t k = 0; k < 4; k++) {
     table_room *room = calloc(1, sizeof *room);
     open_room(room, albedos[k], k + 1, true);
     ask(room, room->ones);
-    int sweeps = k < 3 ? needed(room, &clt_method_gauss_seidel, 100)
-                       : 500 + (error_after(room, &clt_method_gauss_seidel, 500) > 1e-3);
-    print_message("albedo %g: gauss-seidel %d\n", albedos[k], sweeps);
+    print_message("albedo %g\n", albedos[k]);
     if (k < 3) {
-      assert_count("gauss-seidel", sweeps, table[k], .1);
+      assert_count("gauss-seidel", room, &clt_method_gauss_seidel, table[k], .1);
     } else {
-      assert_true(sweeps > 500);
+      assert_true(error_after(room, &clt_method_gauss_seidel, 500) > 1e-3);
     }
     close_room(room);
     free(room);
