@@ -34,7 +34,7 @@ typedef struct clt_channel_certificate {
  * symmetric, dark cells from F (below 1e-3 of the 90th percentile) and the transport's sigma (below 5 of them). Where
  * rows != cols there is no diagonal: a column's sum stands for F, and radius_high, norm_high and reciprocity are
  * infinite (not known). CLT_BAD_INPUT where a value that takes part is not a number, and where no cell shows its own
- * light though light goes elsewhere (a mirror, rows out of order). */
+ * light though light goes elsewhere (a mirror, rows out of order; of a T without sigma). */
 CLT_PUBLIC clt_status clt_certify(const clt_transport *transport, clt_certificate **out, clt_error *error);
 CLT_PUBLIC void clt_certificate_destroy(clt_certificate *certificate);
 CLT_PUBLIC const clt_channel_certificate *clt_certificate_channel(const clt_certificate *certificate, int channel);
