@@ -149,6 +149,13 @@ static clt_outcome run_bounded(clt_system *system, clt_run *run) {
   return settled ? CLT_RUN_CONVERGED : CLT_RUN_STOPPED;
 }
 
+/* For a target that can be reached: steps of two products that gain as conjugate gradients for the normal equations do.
+ * A target that cannot be reached takes the longer, the more cells end at a bound. */
+static void expect(clt_effort *effort) {
+  clt_effort_normal(effort);
+  clt_effort_take(effort, 1, 2, 4 * CLT_SECANTS);
+}
+
 const clt_method clt_method_bounded = {
     .name = "bounded",
     .summary =
@@ -157,5 +164,6 @@ const clt_method clt_method_bounded = {
     .bounded = true,
     .rectangular = true,
     .vectors = BOX_VECTORS + CLT_SECANT_VECTORS,
+    .expect = expect,
     .run = run_bounded,
 };

@@ -15,6 +15,7 @@ struct clt_certificate {
   clt_channel_certificate channel[CLT_CHANNELS_MAX];
   double *first_bounce, *flux; /* channels x cols */
   unsigned char *lit;
+  clt_model model[CLT_CHANNELS_MAX];
 };
 
 static int compare_numbers(const void *left, const void *right) {
@@ -269,6 +270,7 @@ static clt_status certify_channel(clt_certificate *certificate, clt_system *syst
   certify_radius(system, channel);
   channel->norm_high = bound_norm(system);
   channel->reciprocity = clt_flux_weights(system, flux);
+  clt_model_build(system, &certificate->model[c]);
   return CLT_OK;
 }
 
@@ -330,6 +332,10 @@ const double *clt_certificate_first_bounce(const clt_certificate *certificate, i
 
 const double *clt_certificate_flux(const clt_certificate *certificate, int channel) {
   return certificate->flux + (size_t)channel * certificate->cols;
+}
+
+const clt_model *clt_certificate_model(const clt_certificate *certificate, int channel) {
+  return &certificate->model[channel];
 }
 
 bool clt_certificate_fits(const clt_certificate *certificate, const clt_transport *transport) {
