@@ -14,6 +14,7 @@
 #include "counterlight/solve.h"
 #include "counterlight/station.h"
 #include "counterlight/status.h"
+#include "counterlight/tradeoff.h"
 #include "counterlight/transport.h"
 
 #endif

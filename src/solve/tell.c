@@ -44,14 +44,14 @@ static void add_text(char *text, size_t size, const char *format, ...) {
 static void tell_choice(const clt_solver *solver, char *text, size_t size) {
   clt_channel_certificate worst = clt_certificate_worst(solver->certificate);
   const clt_choice *choice = &solver->choice;
-  add_text(text, size, "reciprocity defect %.2g and rho(R) in [%.2g, %.2g]: %s, %d iterations and %.2g ms expected",
+  add_text(text, size, "reciprocity defect %.2g and rho(R) in [%.2g, %.2g]: %s, %d iterations and %.3g ms expected",
            worst.reciprocity, worst.radius_low, worst.radius_high, choice->method->name, choice->expected.iterations,
            1e3 * choice->expected.seconds);
   if (choice->expected.residual > solver->options.tolerance) {
     add_text(text, size, " to come to %.2g in time", choice->expected.residual);
   }
   if (choice->next != NULL) {
-    add_text(text, size, " (%s: %d and %.2g ms)", choice->next->name, choice->next_expected.iterations,
+    add_text(text, size, " (%s: %d and %.3g ms)", choice->next->name, choice->next_expected.iterations,
              1e3 * choice->next_expected.seconds);
   }
 }
