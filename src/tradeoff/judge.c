@@ -37,8 +37,8 @@ static double target_size(const clt_judge *judge, const clt_image *target) {
   return sqrt(sum > 0 ? sum : white_sum);
 }
 
-static clt_status find_best(clt_judge *judge, clt_error *error) {
-  clt_solve_options options = {.method = "bounded", .tolerance = BEST_TOLERANCE};
+static clt_status find_best(clt_judge *judge, double deadline_s, clt_error *error) {
+  clt_solve_options options = {.method = "bounded", .tolerance = BEST_TOLERANCE, .deadline_s = deadline_s};
   clt_solve_result result;
   clt_status status =
       clt_solve(judge->transport, judge->certificate, judge->wanted, &options, judge->shown, &result, error);
@@ -62,7 +62,7 @@ static void take_wanted(clt_judge *judge, const clt_image *target) {
 }
 
 clt_status clt_judge_init(clt_judge *judge, const clt_transport *transport, const clt_certificate *certificate,
-                          const clt_image *picture, const clt_white *white, clt_error *error) {
+                          const clt_image *picture, const clt_white *white, double deadline_s, clt_error *error) {
   enum { ARRAYS = 6 };
   double whites[CLT_CHANNELS_MAX];
   clt_image target = {0};
@@ -89,7 +89,7 @@ clt_status clt_judge_init(clt_judge *judge, const clt_transport *transport, cons
     goto finish;
   }
   take_wanted(judge, &target);
-  status = find_best(judge, error);
+  status = find_best(judge, deadline_s, error);
 
 finish:
   clt_image_finish(&target);

@@ -17,9 +17,10 @@ typedef struct clt_judge {
   double *shown, *part;  /* x', and scratch */
 } clt_judge;
 
-/* Takes the target and finds x*. CLT_BAD_INPUT as clt_tradeoff_measure; ended by clt_judge_finish in either case. */
+/* Takes the target and finds x*, for which it may take deadline_s. CLT_BAD_INPUT as clt_tradeoff_measure; ended by
+ * clt_judge_finish in either case. */
 clt_status clt_judge_init(clt_judge *judge, const clt_transport *transport, const clt_certificate *certificate,
-                          const clt_image *picture, const clt_white *white, clt_error *error);
+                          const clt_image *picture, const clt_white *white, double deadline_s, clt_error *error);
 void clt_judge_finish(clt_judge *judge);
 
 /* Fills the errors of a point from the drive that a solve with `stored` answered; `keeps` where its method kept 0..1.

@@ -279,7 +279,8 @@ static clt_status check_options(const clt_tradeoff_options *options, clt_error *
 static clt_status begin(work *of, const clt_transport *transport, const clt_certificate *certificate,
                         const clt_image *picture, clt_error *error) {
   clt_tradeoff *out = of->out;
-  clt_status status = clt_judge_init(&of->judge, transport, certificate, picture, &of->options->white, error);
+  clt_status status =
+      clt_judge_init(&of->judge, transport, certificate, picture, &of->options->white, of->budget_s, error);
   if (status != CLT_OK) {
     return status;
   }
