@@ -11,7 +11,7 @@
 #include "tradeoff/json.h"
 
 /* That a measurement of what accuracy costs may take, roughly. */
-static const double COST_SECONDS = 0.5;
+static const double COST_SECONDS = 1;
 
 clt_status solver_init(const daemon_boxes *boxes, const store *state, const char *configured, solver *out,
                        clt_error *error) {

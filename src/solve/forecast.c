@@ -40,7 +40,7 @@ static clt_effort expect(const clt_method *method, const clt_certificate *certif
   method->expect(&effort);
   if (deadline_s > 0 && duration(&effort) > deadline_s) {
     double prepare_s = effort.prepare_s;
-    effort.limit = (int)fmax((deadline_s - effort.start_s) / effort.iteration_s, 0);
+    effort.limit = (int)fmin(fmax((deadline_s - effort.start_s) / effort.iteration_s, 0), options->iteration_limit);
     method->expect(&effort);
     effort.prepare_s = prepare_s;
   }

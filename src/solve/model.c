@@ -200,10 +200,10 @@ void clt_effort_normal(clt_effort *effort) {
 }
 
 void clt_effort_steady(clt_effort *effort, double factor) {
-  double r[CLT_MODEL_STEPS];
+  double r[CLT_MODEL_STEPS], bounded = fmin(fmax(factor, 0), 1); /* 1 where it is not known */
   begin(effort, r);
   while (goes_on(effort)) {
-    count(effort, factor * effort->residual);
+    count(effort, bounded * effort->residual);
   }
 }
 
@@ -216,7 +216,8 @@ static size_t next_cell(const double *r, size_t cells, size_t k, bool largest_fi
  * a face take their share of that; columns are scaled to S_ii = 1. */
 void clt_effort_sweeps(clt_effort *effort, double omega, bool largest_first) {
   enum { FACES = 6, FACE = 16, CELLS = FACES * FACE };
-  double rho = (effort->channel->radius_low + effort->channel->radius_high) / 2, m = rho / (1 + rho), r[CELLS];
+  double low = effort->channel->radius_low, high = effort->channel->radius_high;
+  double rho = isfinite(high) ? (low + high) / 2 : low, m = rho / (1 + rho), r[CELLS];
   double rest = 1 / (1 + m / (FACES - 1)), apart = (1 / (1 - m) - rest) / FACES / FACE;
   double near = apart + (rest - 1) / FACE, scale = 1 / (1 + near);
   for (size_t i = 0; i < CELLS; i++) {

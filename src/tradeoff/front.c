@@ -152,32 +152,37 @@ static void tell_limit(clt_tradeoff *tradeoff, const clt_tradeoff_point *nearest
                      : "nothing came that was measured");
 }
 
-/* The levels of the sentence: 1, 2 and 5 times powers of ten; the powers only, where the front spans enough of them. */
+/* Level number k of 1, 1/2, 1/5, 1/10, ..., or of the powers of ten only. */
+static double level_of(int k, bool coarse) {
+  static const double steps[] = {1, .5, .2};
+  return coarse ? pow(10, -k) : pow(10, -(k / 3)) * steps[k % 3];
+}
+
+static void tell_level(clt_tradeoff *tradeoff, double level, const clt_tradeoff_point *point) {
+  char share[24], time[24];
+  clt_front_share(level, share);
+  clt_front_time(point->seconds, time);
+  add_text(tradeoff->sentence, "%s costs %s; ", share, time);
+}
+
+/* Up to three levels of error and what each costs: powers of ten where the front spans enough of them. A point is told
+ * at the finest level that it reaches; levels below `floor` mean nothing. */
 static void tell_levels(clt_tradeoff *tradeoff, const size_t *order, size_t count, double floor) {
-  enum { MOST = 3 };
-  double worst = tradeoff->points[order[0]].error, best = tradeoff->points[order[count - 1]].error;
-  bool coarse = worst >= 30 * fmax(best, floor);
-  const clt_tradeoff_point *said = NULL;
+  enum { MOST = 3, LEVELS = 40 };
+  const clt_tradeoff_point *first = &tradeoff->points[order[0]];
+  bool coarse = first->error >= 30 * fmax(tradeoff->points[order[count - 1]].error, floor);
   int told = 0;
-  for (int k = 0; k > -24 && told < MOST; k--) {
-    static const double steps[] = {1, .5, .2};
-    double level = pow(10, k / 3) * steps[-k % 3];
-    const clt_tradeoff_point *found = fastest_within(tradeoff, order, count, level);
-    char share[24], time[24];
-    if ((coarse && k % 3 != 0) || found == NULL || found == said || level > worst * (1 + 1e-9) || level < floor) {
-      continue;
+  for (int k = 0; k < LEVELS && told < MOST && level_of(k, coarse) >= floor; k++) {
+    double next = level_of(k + 1, coarse);
+    const clt_tradeoff_point *found = fastest_within(tradeoff, order, count, level_of(k, coarse));
+    const clt_tradeoff_point *finer = next >= floor ? fastest_within(tradeoff, order, count, next) : NULL;
+    if (found != NULL && found != finer) {
+      tell_level(tradeoff, level_of(k, coarse), found);
+      told++;
     }
-    clt_front_share(level, share);
-    clt_front_time(found->seconds, time);
-    add_text(tradeoff->sentence, "%s costs %s; ", share, time);
-    said = found;
-    told++;
   }
   if (told == 0) {
-    char share[24], time[24];
-    clt_front_share(worst, share);
-    clt_front_time(tradeoff->points[order[0]].seconds, time);
-    add_text(tradeoff->sentence, "%s costs %s; ", share, time);
+    tell_level(tradeoff, first->error, first);
   }
 }
 

@@ -15,4 +15,5 @@ clt_status clt_front_tell(clt_tradeoff *tradeoff, const clt_tradeoff_options *op
 void clt_front_time(double seconds, char text[24]);
 /* "0.3 %" */
 void clt_front_share(double share, char text[24]);
+
 #endif

@@ -13,7 +13,8 @@
 #include "tradeoff/judge.h"
 
 static const double DEFAULT_SECONDS = 45;
-static const double HELD_MOST = 2e9; /* bytes that a converted T may take */
+static const double BEST_SHARE = 0.3; /* of the time, at most, for the best drive in 0..1 */
+static const double HELD_MOST = 2e9;  /* bytes that a converted T may take */
 enum { POINTS_MOST = 1024, GAPS_MOST = 256, REPEATS_MOST = 5 };
 
 /* At which solves stop. In storage that errs by more than the finest ask for, those would tell nothing more. */
@@ -72,29 +73,53 @@ static bool keeps_bounds(const char *name) {
   return method == NULL || method->bounded; /* NULL: auto */
 }
 
+/* Adds a series. One that the certificate refuses is noted instead, once for every storage. */
 static void add_series(work *of, const char *method, const char *storage) {
-  of->list[of->count++] = (series){method, storage};
+  series added = {method, storage};
+  clt_solve_options options = {.method = method};
+  clt_forecast foretold = {.possible = true};
+  clt_forecast_solve(of->judge.transport, of->judge.certificate, &options, &foretold, NULL);
+  if (foretold.possible) {
+    of->list[of->count++] = added;
+  } else if (storage == NULL) {
+    note_gap(of, &added, "%s", foretold.why_not);
+  }
+}
+
+static void add_products(work *of, const char *storage) {
+  add_series(of, "auto", storage);
+  for (size_t m = 0; clt_method_name(m) != NULL; m++) {
+    if (!keeps_entries(clt_method_name(m))) {
+      add_series(of, clt_method_name(m), storage);
+    }
+  }
+}
+
+/* False, with a note, where T would be too large so stored. */
+static bool fits(work *of, const char *storage) {
+  const clt_transport_info *info = &of->judge.info;
+  double entry = strcmp(storage, "dense64") == 0 ? 8 : strcmp(storage, "dense") == 0 ? 4 : 2;
+  double bytes = entry * (double)info->channels * (double)info->rows * (double)info->cols;
+  if (bytes > HELD_MOST) {
+    note_gap(of, &(series){"every method", storage}, "T would take %.1f GB", 1e-9 * bytes);
+  }
+  return bytes <= HELD_MOST;
 }
 
 /* T as given first, then converted; last those that keep entries, which may need long to be made ready. */
 static void list_series(work *of) {
   static const char *const few[] = {"auto", "damped", "chebyshev", "pcg", "gmres", "bounded"};
+  for (size_t i = 0; of->options->brief && i < sizeof few / sizeof few[0]; i++) {
+    add_series(of, few[i], NULL);
+  }
   if (of->options->brief) {
-    for (size_t i = 0; i < sizeof few / sizeof few[0]; i++) {
-      add_series(of, few[i], NULL);
-    }
     return;
   }
-  for (int s = -1; s < 0 || clt_transport_storage_name((size_t)s) != NULL; s++) {
-    const char *storage = s < 0 ? NULL : clt_transport_storage_name((size_t)s);
-    if (storage != NULL && strcmp(storage, of->judge.info.storage) == 0) {
-      continue;
-    }
-    add_series(of, "auto", storage);
-    for (size_t m = 0; clt_method_name(m) != NULL; m++) {
-      if (!keeps_entries(clt_method_name(m))) {
-        add_series(of, clt_method_name(m), storage);
-      }
+  add_products(of, NULL);
+  for (size_t s = 0; clt_transport_storage_name(s) != NULL; s++) {
+    const char *storage = clt_transport_storage_name(s);
+    if (strcmp(storage, of->judge.info.storage) != 0 && fits(of, storage)) {
+      add_products(of, storage);
     }
   }
   for (size_t m = 0; clt_method_name(m) != NULL; m++) {
@@ -184,7 +209,7 @@ static bool has_time(work *of, const series *at, double tolerance, double left_s
     return true; /* the refusal says why */
   }
   double needed = foretold.prepare_seconds + foretold.seconds;
-  if (needed <= left_s) {
+  if (needed <= left_s || of->out->count == 0) { /* one point there is, however long it takes */
     return true;
   }
   note_gap(of, at, "tolerances of %.0e and below would take about %.2g s, more than its share of the time", tolerance,
@@ -210,8 +235,6 @@ static clt_status measure_series(work *of, const series *at, clt_error *error) {
 
 /* Turns to the storage of a series; false, with a note, where it cannot be had. */
 static bool take_storage(work *of, const series *at) {
-  static const double bytes_an_entry[] = {8, 4, 2, 1.125};
-  const clt_transport_info *info = &of->judge.info;
   clt_error why = {0};
   if (of->storage == at->storage && (at->storage == NULL || of->converted != NULL)) {
     return true;
@@ -219,23 +242,11 @@ static bool take_storage(work *of, const series *at) {
   clt_transport_destroy(of->converted);
   of->converted = NULL;
   of->storage = at->storage;
-  if (at->storage == NULL) {
+  if (at->storage == NULL || clt_transport_convert(of->judge.transport, at->storage, &of->converted, &why) == CLT_OK) {
     return true;
   }
-  double entry = bytes_an_entry[1];
-  for (size_t s = 0; s < 4 && clt_transport_storage_name(s) != NULL; s++) {
-    entry = strcmp(clt_transport_storage_name(s), at->storage) == 0 ? bytes_an_entry[s] : entry;
-  }
-  double bytes = entry * (double)info->channels * (double)info->rows * (double)info->cols;
-  if (bytes > HELD_MOST) {
-    note_gap(of, at, "T would take %.1f GB so stored", 1e-9 * bytes);
-    return false;
-  }
-  if (clt_transport_convert(of->judge.transport, at->storage, &of->converted, &why) != CLT_OK) {
-    note_gap(of, at, "%s", why.message);
-    return false;
-  }
-  return true;
+  note_gap(of, at, "%s", why.message);
+  return false;
 }
 
 static clt_status tell_progress(const work *of, const series *at, clt_error *error) {
@@ -279,8 +290,8 @@ static clt_status check_options(const clt_tradeoff_options *options, clt_error *
 static clt_status begin(work *of, const clt_transport *transport, const clt_certificate *certificate,
                         const clt_image *picture, clt_error *error) {
   clt_tradeoff *out = of->out;
-  clt_status status =
-      clt_judge_init(&of->judge, transport, certificate, picture, &of->options->white, of->budget_s, error);
+  clt_status status = clt_judge_init(&of->judge, transport, certificate, picture, &of->options->white,
+                                     BEST_SHARE * of->budget_s, error);
   if (status != CLT_OK) {
     return status;
   }
