@@ -86,8 +86,8 @@ CLT_PUBLIC bool clt_method_invests(size_t index);
 
 /* What a method is expected to take, before it runs: told by the certificate, which tried S on a random picture (16
  * products with T a channel) and timed that. Pictures differ, and so does a machine from one minute to the next. Expect
- * the iterations of series, jacobi, damped, chebyshev, pcg, deflated-pcg and gmres within one or a third, those of the
- * others mostly within a factor of two, at worst of six (docs/solving.md). */
+ * the iterations of series, jacobi, damped, chebyshev, pcg, deflated-pcg and gmres within one or half as many again,
+ * those of the others mostly within a factor of two, at worst of six (docs/solving.md). */
 typedef struct clt_forecast {
   bool possible;
   char why_not[CLT_MESSAGE_MAX]; /* where it is not possible: the reason */

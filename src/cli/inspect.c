@@ -177,7 +177,7 @@ static const char notes[] =
     "plain iteration (Bai et al. 2010, eq. 43) converges. The reciprocity defect is near 0 for a diffuse, calibrated\n"
     "room. auto is asked with an even grey for a target; a picture that reaches the limits 0 or 1 may get another.\n"
     "What each method would take is foretold by the certificate, which tried S on a random picture and timed that:\n"
-    "iterations within a third for the methods by products (but lsmr, bounded), mostly within a factor of two for the\n"
+    "iterations within a half for the methods by products (but lsmr, bounded), mostly within a factor of two for the\n"
     "others; times as steady as the machine is. bounded is foretold for a picture that every cell can reach.\n";
 
 const cli_command cli_command_inspect = {

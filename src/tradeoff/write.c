@@ -14,9 +14,9 @@ static void put_table(const clt_tradeoff *tradeoff, FILE *to) {
         to);
   for (size_t k = 0; k < tradeoff->count; k++) {
     const clt_tradeoff_point *point = &tradeoff->points[k];
-    fprintf(to, "%zu,%s,%s,%g,%d,%.17g,%d,%.6g,%.17g,%.9g,%.9g,%.9g,", k, point->method, point->storage, point->tolerance,
-            point->iterations, 1e3 * point->seconds, point->repeats, 1e3 * point->prepare_seconds, point->error,
-            point->solver_error, point->storage_error, point->clipping_error);
+    fprintf(to, "%zu,%s,%s,%g,%d,%.17g,%d,%.6g,%.17g,%.9g,%.9g,%.9g,", k, point->method, point->storage,
+            point->tolerance, point->iterations, 1e3 * point->seconds, point->repeats, 1e3 * point->prepare_seconds,
+            point->error, point->solver_error, point->storage_error, point->clipping_error);
     if (point->noise_error >= 0) {
       fprintf(to, "%.9g", point->noise_error);
     }
