@@ -234,6 +234,25 @@ class Tradeoff(PathTest):
         write_transport(self.folder / "tall.h5", np.ones((1, 100, 80)), WIDTH, HEIGHT)
         self.refused("tradeoff", self.folder / "tall.h5", "--target", self.picture, "-o", self.folder / "out")
 
+    def test_inspect_foretells_what_compensate_takes(self):
+        self.given(1, 0.6, np.random.default_rng(2).uniform(0, 1, (1, HEIGHT, WIDTH)))
+        for tolerance in (1e-2, 1e-5):
+            answer = answer_of("inspect", self.transport, "--tolerance", tolerance)
+            foretold = {f["method"]: f for f in answer["forecasts"]}
+            self.assertFalse(foretold["jacobi"]["possible"])
+            self.assertIn("diverges", foretold["jacobi"]["why_not"])
+            self.assertIsNone(foretold["jacobi"]["iterations"])
+            for method in ("damped", "chebyshev", "pcg", "gmres", "sor"):
+                real = answer_of("compensate", self.transport, "--target", self.picture, "-o", self.folder / "d.npy",
+                                 "--method", method, "--tolerance", tolerance)
+                self.assertLessEqual(foretold[method]["residual"], tolerance)
+                self.assertLessEqual(abs(foretold[method]["iterations"] - real["iterations"]),
+                                     max(2, 0.5 * real["iterations"]), method)
+            short = answer_of("inspect", self.transport, "--tolerance", tolerance, "--deadline-ms", 0.01)
+            slow = {f["method"]: f for f in short["forecasts"]}["damped"]
+            self.assertTrue(slow["residual"] > tolerance and slow["iterations"] < foretold["damped"]["iterations"])
+            self.assertIn("iterations", answer["auto"]["reason"])
+
     def test_says_it_in_words_or_not_at_all(self):
         self.given(1, 0.3, soft_picture(1))
         words = ("tradeoff", self.transport, "--target", self.picture, "-o", self.folder / "out", "--seconds", 2)
