@@ -36,6 +36,8 @@ typedef struct clt_channel_certificate {
  * infinite (not known). CLT_BAD_INPUT where a value that takes part is not a number, and where no cell shows its own
  * light though light goes elsewhere (a mirror, rows out of order; of a T without sigma). */
 CLT_PUBLIC clt_status clt_certify(const clt_transport *transport, clt_certificate **out, clt_error *error);
+/* The `white` of every channel alone (channels values): without the products that the bounds take. */
+CLT_PUBLIC clt_status clt_certify_white(const clt_transport *transport, double *white, clt_error *error);
 CLT_PUBLIC void clt_certificate_destroy(clt_certificate *certificate);
 CLT_PUBLIC const clt_channel_certificate *clt_certificate_channel(const clt_certificate *certificate, int channel);
 /* lit[i] != 0 where cell i of the channel takes part; cols values, owned by the certificate. */

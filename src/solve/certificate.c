@@ -308,6 +308,25 @@ clt_status clt_certify(const clt_transport *transport, clt_certificate **out, cl
   return CLT_OK;
 }
 
+clt_status clt_certify_white(const clt_transport *transport, double *white, clt_error *error) {
+  clt_transport_info info = clt_transport_describe(transport);
+  clt_system system = {0};
+  double *first_bounce = clt_alloc(info.cols, sizeof *first_bounce);
+  unsigned char *lit = clt_alloc(info.cols, sizeof *lit);
+  clt_status status = first_bounce != NULL && lit != NULL
+                          ? clt_system_init(&system, transport, false, error)
+                          : clt_fail(error, CLT_FAILED, "not enough memory for the white of %zu cells", info.cols);
+  for (int c = 0; status == CLT_OK && c < info.channels; c++) {
+    measure_first_bounce(&system, c, first_bounce);
+    find_lit(&system, c, first_bounce, lit, system.drive);
+    white[c] = quantile(first_bounce, lit, info.cols, 0.5, system.drive);
+  }
+  clt_system_finish(&system);
+  free(first_bounce);
+  free(lit);
+  return status;
+}
+
 void clt_certificate_destroy(clt_certificate *certificate) {
   if (certificate == NULL) {
     return;
