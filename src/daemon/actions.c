@@ -126,6 +126,7 @@ static void stop(control *self) {
   if (job != NULL) {
     job->kind = SOLVER_STOP;
     clt_mailbox_put(self->boxes->solver_jobs, job);
+    control_hasten(self);
   }
   order(self, OUTPUT_STOP);
 }

@@ -5,7 +5,7 @@
  *   (e t / W + (s_r / W)^2 + (h'(v) q)^2 / 12) / t^2
  * (photons, reading, quantisation; W full well in electrons, s_r read noise in electrons, q one code value as a step of
  * v), evaluated at the merged e and not at the sample, so that a dark fluctuation gets no more weight than a bright one
- * (Granados et al. 2010). */
+ * (Granados et al. 2010). Saturated exposures are left out, and so are dead ones, dark where two others show light. */
 #ifndef CLT_RIG_MERGE_H
 #define CLT_RIG_MERGE_H
 

@@ -89,6 +89,13 @@ static clt_status prepare_rig(clt_camera_rig *rig, clt_error *error) {
   if (status == CLT_OK) {
     status = check_timing(rig, error);
   }
+  if (status == CLT_OK && rig->shots.sensor.own_pixels) {
+    status =
+        clt_fail(error, CLT_BAD_INPUT,
+                 "this camera has pixels of its own: calibrate first; which of its %d x %d pixels see which cell is "
+                 "not known",
+                 rig->shots.sensor.width, rig->shots.sensor.height);
+  }
   if (status == CLT_OK) {
     status = clt_patch_check(&config->patch, config->width, config->height, error);
   }

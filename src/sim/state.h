@@ -9,6 +9,7 @@
 #include "sim/effects/plan.h"
 #include "sim/light.h"
 #include "sim/timeline.h"
+#include "sim/view.h"
 
 struct clt_scene {
   clt_scene_description description;
@@ -24,6 +25,8 @@ struct clt_scene {
   int exposure_delay;                      /* frames from a request until it holds */
   int64_t line_ns;                         /* from the exposure of a row of pixels to that of the next */
   clt_plan plan;
+  clt_view view;       /* of a camera with pixels of its own */
+  double view_ms;      /* that tracing it took */
   double brightest;    /* radiance of the brightest cell under full drive */
   double responsivity; /* of the camera, described or chosen */
   /* Below: under lock, for the projector and the camera may be called from two threads. */

@@ -4,7 +4,7 @@ import sys
 import unittest
 
 PROGRAM = sys.argv[1]
-COMMANDS = ("demo acquire compensate relight bounces separate repaint inspect reproduce simulate scene status show watch "
+COMMANDS = ("demo acquire compensate relight bounces separate repaint inspect tradeoff reproduce simulate scene status show watch "
             "reacquire snapshot hold resume reload").split()
 
 
