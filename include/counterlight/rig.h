@@ -58,11 +58,15 @@ typedef struct clt_rig_config {
   int attempts;          /* per frame, >= 1 */
   bool verify;           /* exposures of one picture that contradict each other are taken again */
   clt_patch patch;
+  /* Which camera pixels see which cell; not owned, outlives the rig. NULL: the camera sees the grid magnified by a
+   * whole factor. */
+  const struct clt_calibration *calibration;
   char source[CLT_MESSAGE_MAX / 4];
 } clt_rig_config;
 
-/* A rig on an opened projector and camera, which must outlive it. The camera sees the grid magnified by a whole factor
- * (k x k camera pixels a cell). CLT_BAD_INPUT where sizes or exposures do not fit; the message says how. */
+/* A rig on an opened projector and camera, which must outlive it. Without a calibration the camera sees the grid
+ * magnified by a whole factor (k x k camera pixels a cell). CLT_BAD_INPUT where sizes or exposures do not fit; the
+ * message says how. */
 CLT_PUBLIC clt_status clt_rig_open(const clt_rig_config *config, clt_projector *projector, clt_camera *camera,
                                    clt_rig **out, clt_error *error);
 

@@ -4,6 +4,7 @@
 
 #include "base/memory.h"
 #include "counterlight/transport.h"
+#include "rig/calibration.h"
 #include "rig/internal.h"
 #include "rig/timing/patch.h"
 
@@ -83,25 +84,45 @@ static clt_status check_timing(const clt_camera_rig *rig, clt_error *error) {
   return CLT_OK;
 }
 
+/* By the calibration's pixel map, or whole pixels a cell. */
+static clt_status lay_footprints(clt_camera_rig *rig, clt_error *error) {
+  const clt_rig_config *config = &rig->config;
+  const clt_camera_info *sensor = &rig->shots.sensor;
+  const clt_projector_info *panel = &rig->shots.panel;
+  clt_footprint_report report;
+  if (config->calibration == NULL && sensor->own_pixels) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "this camera has pixels of its own: calibrate first (counterlight calibrate); which of its %d x %d "
+                    "pixels see which cell is not known",
+                    sensor->width, sensor->height);
+  }
+  if (config->calibration == NULL) {
+    return clt_footprints_align(config->width, config->height, sensor->width, sensor->height, &rig->footprints, error);
+  }
+  const clt_pixel_map *map = &config->calibration->map;
+  if (map->width != sensor->width || map->height != sensor->height || map->panel_width != panel->width ||
+      map->panel_height != panel->height) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "the calibration is of %d x %d camera and %d x %d panel pixels, the devices have %d x %d and "
+                    "%d x %d; calibrate again",
+                    map->width, map->height, map->panel_width, map->panel_height, sensor->width, sensor->height,
+                    panel->width, panel->height);
+  }
+  return clt_footprints_map(map, config->calibration->info.pitch, config->width, config->height, &rig->footprints, NULL,
+                            &report, error);
+}
+
 static clt_status prepare_rig(clt_camera_rig *rig, clt_error *error) {
   const clt_rig_config *config = &rig->config;
   clt_status status = check_sizes(rig, error);
   if (status == CLT_OK) {
     status = check_timing(rig, error);
   }
-  if (status == CLT_OK && rig->shots.sensor.own_pixels) {
-    status =
-        clt_fail(error, CLT_BAD_INPUT,
-                 "this camera has pixels of its own: calibrate first; which of its %d x %d pixels see which cell is "
-                 "not known",
-                 rig->shots.sensor.width, rig->shots.sensor.height);
-  }
   if (status == CLT_OK) {
     status = clt_patch_check(&config->patch, config->width, config->height, error);
   }
   if (status == CLT_OK) {
-    status = clt_footprints_align(config->width, config->height, rig->shots.sensor.width, rig->shots.sensor.height,
-                                  &rig->footprints, error);
+    status = lay_footprints(rig, error);
   }
   if (status == CLT_OK) {
     status = clt_merge_init(&rig->merge, &rig->shots.sensor, &config->camera, &rig->footprints, config->exposure_count,

@@ -6,13 +6,14 @@
 
 #include "base/memory.h"
 
-enum { RADIUS_MAX = 3, WINDOW_MAX = (2 * RADIUS_MAX + 1) * (2 * RADIUS_MAX + 1), LAG = 4, PASSES = 2 };
+enum { RADIUS_USUAL = 3, RADIUS_MAX = 20, WINDOW_MAX = (2 * RADIUS_MAX + 1) * (2 * RADIUS_MAX + 1), LAG = 4, PASSES = 2 };
 enum { BINS = 4096, BINS_PER_PIXEL = 64 }; /* of the histogram of pitches, panel pixels */
 #define STEEP 3.0                          /* times the usual pitch that a surface may have */
 #define SLACK 1.0                          /* panel pixels that stripes are always uncertain to */
 #define SIGMAS 3.0
 #define SUPPORT 0.2 /* of the window */
 #define REACH 2.5   /* panel pixels that a window reaches to each side */
+#define FINE 0.34   /* pitch below which a panel pixel spans so many camera pixels that only its edges tell places */
 
 /* What a pixel's window is made of, relative to the pixel. */
 typedef struct window {
@@ -194,7 +195,7 @@ clt_status clt_pixel_map_refine(clt_pixel_map *map, const float *variance, doubl
   }
   *pitch = measure_pitch(map);
   refiner r = {.map = map, .variance = variance, .pixels = (size_t)map->width * (size_t)map->height};
-  r.radius = (int)fmin(fmax(lround(REACH / *pitch), 1), RADIUS_MAX);
+  r.radius = (int)fmin(fmax(lround(REACH / *pitch), 1), *pitch < FINE ? RADIUS_MAX : RADIUS_USUAL);
   for (int v = -RADIUS_MAX; v <= RADIUS_MAX; v++) {
     for (int u = -RADIUS_MAX; u <= RADIUS_MAX; u++) {
       r.reach[v + RADIUS_MAX][u + RADIUS_MAX] = (float)(STEEP * *pitch * hypot(u, v));
