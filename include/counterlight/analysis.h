@@ -95,8 +95,8 @@ CLT_PUBLIC clt_status clt_bounces_of_picture(clt_interreflection *interreflectio
                                              clt_bounces *out, clt_error *error);
 CLT_PUBLIC void clt_bounces_finish(clt_bounces *bounces); /* accepts a zeroed one and NULL */
 
-/* How far eq. 51 is from the bounces, by solves of the same tolerance: difference[k] = ||l_d - S^-1 (b_0 + ... +
- * b_(k-1)) - b_k|| / ||b_k|| over lit cells, k = 1..count, with eq. 51's own partial sums; difference[0] = 0; infinite
+/* How far eq. 51 is from given bounces of the same drive: difference[k] = ||l_d - S^-1 (b_0 + ... + b_(k-1)) - b_k|| /
+ * ||b_k|| over lit cells, k = 1..count, S^-1 by a solve of the interreflection's tolerance; difference[0] = 0; infinite
  * where b_k is 0. count + 1 values. */
 CLT_PUBLIC clt_status clt_bounces_compare_sums(clt_interreflection *interreflection, const clt_bounces *bounces,
                                                double *difference, clt_error *error);

@@ -6,6 +6,7 @@
 #ifndef COUNTERLIGHT_DEVICE_H
 #define COUNTERLIGHT_DEVICE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "counterlight/status.h"
@@ -34,6 +35,7 @@ typedef struct clt_camera_info {
   double responsivity; /* 1 / (radiance * s): fraction of full scale; 1 where not known */
   double full_well;    /* electrons at full scale, > 0: photon noise has variance signal * full_well */
   double read_noise;   /* electrons, rms */
+  bool own_pixels;     /* which pixel sees which part of the picture must be measured: no grid is promised */
 } clt_camera_info;
 
 typedef struct clt_camera clt_camera;

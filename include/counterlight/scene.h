@@ -28,7 +28,8 @@ CLT_PUBLIC void clt_scene_close(clt_scene *scene); /* accepts NULL; after its de
  * scene). Never read on the way from patterns to frames to the acquired T. */
 CLT_PUBLIC const clt_transport *clt_scene_transport(const clt_scene *scene);
 /* The rig settings that an installer would have measured on this scene: grid, response curves, exposures, a latency
- * with margin. */
+ * with margin; not which pixel sees what, so that a rig on a camera with pixels of its own still has to be calibrated.
+ */
 CLT_PUBLIC void clt_scene_rig_config(const clt_scene *scene, clt_rig_config *config);
 /* The exact radiance of every grid cell under a steady drive, black included: b0 + T drive, with what the scene does to
  * the drive before (crosstalk, defocus) and to the radiance after it (subsurface). What changes with time and what the
@@ -53,6 +54,18 @@ typedef struct clt_reference {
 CLT_PUBLIC clt_status clt_scene_reference(const clt_scene *scene, const clt_image *drive, int cells, clt_reference *out,
                                           clt_error *error);
 
+/* Radiance of a scene's surface elements where every one of them glows with radiance 1. */
+typedef struct clt_furnace {
+  int elements;           /* of the surfaces that exchange light */
+  double least, greatest; /* radiance of an element */
+} clt_furnace;
+/* The furnace test of how a scene exchanges light: B = 1 + albedo G B, solved exactly in double, with the same albedo
+ * (0 to below 1) on every surface in place of its own. In a closed room B is 1 / (1 - albedo) everywhere, whatever its
+ * shape; where light escapes it is less, and nowhere more. CLT_BAD_INPUT for a scene of a transport file and for one
+ * whose surfaces exchange no light. Meshes the scene anew as a small one is, whatever its grid; at most some seconds.
+ */
+CLT_PUBLIC clt_status clt_scene_furnace(const clt_scene *scene, double albedo, clt_furnace *out, clt_error *error);
+
 enum { CLT_EFFECTS = 22, CLT_EFFECT_WHY_MAX = 160 };
 /* What the simulation does about one effect in one scene. */
 typedef struct clt_effect_report {
@@ -66,6 +79,27 @@ typedef struct clt_effect_report {
 /* Every effect that a scene may call for, in the order in which light meets them; one that is off costs nothing. Runs
  * each a few times to measure it: call it while no device of the scene is in use. */
 CLT_PUBLIC clt_status clt_scene_effects(clt_scene *scene, clt_effect_report reports[CLT_EFFECTS], clt_error *error);
+
+/* What a camera with pixels of its own sees, in shares of its image that add up to 1; all zeros for one whose pixels
+ * are the grid's, k x k a cell. */
+typedef struct clt_pixels_report {
+  bool own;
+  double lit;        /* surfaces where the projector lights them */
+  double shadowed;   /* surfaces in its picture that it does not reach */
+  double outside;    /* surfaces beyond its picture */
+  double nothing;    /* no surface, or the black back of one */
+  double prepare_ms; /* that opening the scene took for tracing the pixels */
+  double frame_ms;   /* that their light takes of a frame, measured */
+  size_t bytes;      /* of memory that it holds */
+} clt_pixels_report;
+/* Measures: call it while no device of the scene is in use. */
+CLT_PUBLIC clt_status clt_scene_pixels(const clt_scene *scene, clt_pixels_report *report, clt_error *error);
+/* The true geometry of a camera with pixels of its own, for tests and references only, of what the middle of each of
+ * its pixels sees: channel 0 of map is x and channel 1 is y of the place in the projector's picture, in cells from its
+ * left and its top (cell k spans k to k + 1), NaN where the projector does not light what is seen; channel 2 is 1 where
+ * it does, 0 where nothing is seen, 2 for a shadow, 3 beyond the projector's picture. map is initialised here.
+ * CLT_BAD_INPUT for a camera whose pixels are the grid's. */
+CLT_PUBLIC clt_status clt_scene_pixel_map(const clt_scene *scene, clt_image *map, clt_error *error);
 
 /* The scene's projector and camera. One of each may be open at a time; both live in the scene's simulated time, which
  * moves on only when one of them is asked for something. The same seed gives the same frames. */

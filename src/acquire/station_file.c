@@ -83,8 +83,10 @@ clt_status clt_station_read(const char *path, clt_station_config *config, clt_er
   set_defaults(config);
   clt_section root = clt_settings_root(settings);
   status = read_scene(root, path, config, error);
-  read_device(clt_section_group(root, "projector"), config->projector, sizeof config->projector, &config->rig.projector,
+  clt_curve panel = {.kind = CLT_CURVE_LINEAR};
+  read_device(clt_section_group(root, "projector"), config->projector, sizeof config->projector, &panel,
               &config->projector_response_given);
+  config->rig.projector = clt_panel_of_curve(&panel);
   read_device(clt_section_group(root, "camera"), config->camera, sizeof config->camera, &config->rig.camera,
               &config->camera_response_given);
   read_rig(clt_section_group(root, "rig"), &config->rig);

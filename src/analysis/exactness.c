@@ -1,94 +1,38 @@
 /* Where A = I - F T^-1 is what bounces do: the exact F, and signs that the scene is not made of flat diffuse patches.
  */
-#include <lapacke.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "analysis/interreflection.h"
-#include "base/memory.h"
+#include "analysis/lit_inverse.h"
 
 static const double SPREAD_LIMIT = 0.01, RECIPROCITY_LIMIT = 0.1;
 
-/* The lit rows and columns of T, row-major, in double; index lists the lit cells. */
-static clt_status gather_lit(const clt_transport *transport, int channel, const size_t *index, size_t count,
-                             double *row, double *matrix, clt_error *error) {
-  clt_status status = CLT_OK;
-  for (size_t i = 0; i < count && status == CLT_OK; i++) {
-    status = clt_transport_row(transport, channel, index[i], row, error);
-    for (size_t j = 0; j < count && status == CLT_OK; j++) {
-      matrix[i * count + j] = row[index[j]];
-    }
-  }
-  return status;
-}
-
-static clt_status invert(double *matrix, lapack_int *pivots, size_t count, clt_error *error) {
-  lapack_int n = (lapack_int)count;
-  lapack_int failed = LAPACKE_dgetrf(LAPACK_ROW_MAJOR, n, n, matrix, n, pivots);
-  if (failed == 0) {
-    failed = LAPACKE_dgetri(LAPACK_ROW_MAJOR, n, matrix, n, pivots);
-  }
-  return failed == 0
-             ? CLT_OK
-             : clt_fail(error, CLT_BAD_INPUT,
-                        "T has no inverse (LAPACK says %d), so F cannot come from its diagonal; take F = diag(T)",
-                        (int)failed);
-}
-
-static clt_status take_reciprocals(const double *inverse, const size_t *index, size_t count, double *first_bounce,
-                                   clt_error *error) {
-  for (size_t i = 0; i < count; i++) {
-    double diagonal = inverse[i * count + i];
+static clt_status take_reciprocals(const clt_lit_inverse *inverse, double *first_bounce, clt_error *error) {
+  for (size_t i = 0; i < inverse->count; i++) {
+    double diagonal = inverse->entries[i * inverse->count + i];
     if (!(diagonal > 0) || !isfinite(diagonal)) {
-      return clt_fail(error, CLT_BAD_INPUT,
-                      "(T^-1)_ii of cell %zu is %g; T is too noisy there for an exact first "
-                      "bounce; take F = diag(T)",
-                      index[i], diagonal);
+      return clt_fail(error, CLT_BAD_INPUT, "(T^-1)_ii of cell %zu is %g; T is too noisy there", inverse->cell[i],
+                      diagonal);
     }
-    first_bounce[index[i]] = 1 / diagonal;
+    first_bounce[inverse->cell[i]] = 1 / diagonal;
   }
   return CLT_OK;
 }
 
 clt_status clt_exact_first_bounce(const clt_transport *transport, int channel, const unsigned char *lit,
                                   double *first_bounce, clt_error *error) {
-  size_t cells = clt_transport_describe(transport).cols, count = 0;
-  for (size_t i = 0; i < cells; i++) {
-    count += lit[i] != 0;
-  }
-  if (count > CLT_EXACT_CELLS_MAX) {
-    return clt_fail(error, CLT_BAD_INPUT,
-                    "the exact first bounce needs the inverse of T over %zu lit cells, and %d are the most (%.0f MB); "
-                    "take F = diag(T)",
-                    count, CLT_EXACT_CELLS_MAX, 8e-6 * CLT_EXACT_CELLS_MAX * CLT_EXACT_CELLS_MAX);
-  }
-  double *row = clt_alloc(cells, sizeof *row), *matrix = clt_alloc(count * count, sizeof *matrix);
-  size_t *index = clt_alloc(cells, sizeof *index), found = 0;
-  lapack_int *pivots = clt_alloc(cells, sizeof *pivots);
-  clt_status status = CLT_OK;
-  if (!row || !matrix || !index || !pivots) {
-    status = clt_fail(error, CLT_FAILED, "not enough memory to invert T over %zu cells; take F = diag(T)", count);
-  }
-  for (size_t i = 0; i < cells && status == CLT_OK; i++) {
-    if (lit[i]) {
-      index[found++] = i;
-    }
-  }
+  clt_lit_inverse inverse = {0};
+  clt_status status = clt_lit_inverse_init(&inverse, transport, channel, lit, error);
   if (status == CLT_OK) {
-    status = gather_lit(transport, channel, index, count, row, matrix, error);
+    status = take_reciprocals(&inverse, first_bounce, error);
   }
-  if (status == CLT_OK && count > 0) {
-    status = invert(matrix, pivots, count, error);
+  clt_lit_inverse_finish(&inverse);
+  if (status != CLT_OK) {
+    clt_fail_within(error, "the exact first bounce cannot be had, take F = diag(T): ");
   }
-  if (status == CLT_OK) {
-    status = take_reciprocals(matrix, index, count, first_bounce, error);
-  }
-  free(row);
-  free(matrix);
-  free(index);
-  free(pivots);
   return status;
 }
 

@@ -17,9 +17,9 @@ typedef struct simulated_camera {
   clt_shutter shutter;
   int width, height; /* of a frame */
   int bands;
-  clt_band *band; /* one, or one for each row of pixels */
-  clt_exposure exposure;
-  clt_signal signal; /* its radiance is the exposure's where no effect tells the pixels of a cell apart */
+  clt_band *band;        /* one, or one for each row of pixels */
+  clt_exposure exposure; /* its channels stand there once for each layer */
+  clt_signal signal;     /* its radiance is the exposure's where nothing tells the pixels of a cell apart */
   uint16_t *samples;
   bool delivered; /* samples hold a frame */
 } simulated_camera;
@@ -37,7 +37,8 @@ static void describe(const clt_camera *camera, clt_camera_info *info) {
                             .black_level = sensor->black_level,
                             .responsivity = self->scene->responsivity,
                             .full_well = sensor->full_well,
-                            .read_noise = sensor->read_noise};
+                            .read_noise = sensor->read_noise,
+                            .own_pixels = sensor->own_pixels};
 }
 
 static clt_status set_exposure(clt_camera *camera, double seconds, clt_error *error) {
@@ -66,18 +67,20 @@ static void spread_over_pixels(simulated_camera *self) {
   }
 }
 
-/* Electrons of a fully exposed pixel are full_well; a negative radiance (of a measured transport) frees none. */
-static void expect_electrons(simulated_camera *self, double exposure_s) {
+/* Electrons of a fully exposed pixel are full_well; a negative radiance (of a measured transport) frees none, nor does
+ * any in the lowest rows, a share `dark` of them. */
+static void expect_electrons(simulated_camera *self, double exposure_s, double dark) {
   const clt_camera_description *sensor = &self->scene->description.camera;
   clt_signal *signal = &self->signal;
   double gain = self->scene->responsivity * exposure_s * sensor->full_well;
   size_t values = (size_t)signal->width * (size_t)signal->height * (size_t)signal->channels;
-  if (signal->radiance != self->exposure.radiance) {
+  if (signal->radiance != self->exposure.radiance && !sensor->own_pixels) {
     spread_over_pixels(self);
   }
   clt_plan_signal(&self->scene->plan, signal);
   for (size_t k = 0; k < values; k++) {
-    signal->electrons[k] = fmax(0.0, gain * (double)signal->radiance[k]);
+    bool lit = (int)(k / (size_t)signal->width) % signal->height < (1.0 - dark) * signal->height;
+    signal->electrons[k] = lit ? fmax(0.0, gain * (double)signal->radiance[k]) : 0.0;
   }
   clt_plan_electrons(&self->scene->plan, signal);
 }
@@ -116,19 +119,39 @@ static void form_samples(simulated_camera *self, uint32_t sequence) {
   }
 }
 
+/* Rows of pixels that see cells from anywhere in the picture: every cell's light over their time. */
+static void form_rows(simulated_camera *self, const clt_band *band, int first, int last) {
+  clt_scene *scene = self->scene;
+  clt_exposure layer = self->exposure;
+  layer.channels = scene->description.channels;
+  clt_timeline_expose(&scene->timeline, band, &self->exposure);
+  for (int k = 0; k < scene->plan.layers; k++) {
+    clt_plan_expose(&scene->plan, &layer, band, 1);
+    layer.radiance += scene->plan.values;
+  }
+  clt_view_form(&scene->view, self->exposure.radiance, first, last, &self->signal);
+}
+
 /* The light of a frame, row by row where the shutter rolls. Returns when the last row ends. */
 static int64_t collect_light(simulated_camera *self, const clt_shutter *taken) {
   clt_scene *scene = self->scene;
-  int rows = self->exposure.height / self->bands;
+  bool own = scene->description.camera.own_pixels;
+  int rows = self->exposure.height / self->bands, pixels = self->height / self->bands;
   for (int b = 0; b < self->bands; b++) {
     int64_t start_ns = taken->start_ns + b * scene->line_ns;
-    self->band[b] = (clt_band){.first = b * rows,
-                               .last = (b + 1) * rows,
+    self->band[b] = (clt_band){.first = own ? 0 : b * rows,
+                               .last = own ? self->exposure.height : (b + 1) * rows,
                                .start_ns = start_ns,
                                .end_ns = start_ns + clt_shutter_exposure_ns(taken)};
-    clt_timeline_expose(&scene->timeline, &self->band[b], &self->exposure);
+    if (own) {
+      form_rows(self, &self->band[b], b * pixels, (b + 1) * pixels);
+    } else {
+      clt_timeline_expose(&scene->timeline, &self->band[b], &self->exposure);
+    }
   }
-  clt_plan_expose(&scene->plan, &self->exposure, self->band, self->bands);
+  if (!own) {
+    clt_plan_expose(&scene->plan, &self->exposure, self->band, self->bands);
+  }
   return self->band[self->bands - 1].end_ns;
 }
 
@@ -170,7 +193,7 @@ static clt_status next(clt_camera *camera, int64_t not_before_ns, double timeout
     return status;
   }
   if (!fate.stuck || !self->delivered) {
-    expect_electrons(self, taken.exposure_s);
+    expect_electrons(self, taken.exposure_s, fate.dark);
     form_samples(self, taken.sequence);
     self->delivered = true;
   }
@@ -218,16 +241,18 @@ static bool make_buffers(simulated_camera *self) {
   int pixels = description->camera.cell_pixels, split = plan->per_row ? pixels : 1, channels = description->channels;
   clt_exposure *exposure = &self->exposure;
   clt_signal *signal = &self->signal;
-  *exposure = (clt_exposure){
-      .width = description->width, .height = description->height * split, .channels = channels, .split = split};
+  *exposure = (clt_exposure){.width = description->width,
+                             .height = description->height * split,
+                             .channels = channels * plan->layers,
+                             .split = split};
   *signal = (clt_signal){.width = plan->per_pixel ? self->width : exposure->width,
                          .height = plan->per_pixel ? self->height : exposure->height,
                          .channels = channels};
-  size_t cells = (size_t)exposure->width * (size_t)exposure->height * (size_t)channels;
+  size_t cells = (size_t)exposure->width * (size_t)exposure->height * (size_t)exposure->channels;
   size_t values = (size_t)signal->width * (size_t)signal->height * (size_t)channels;
   bool exposes = clt_plan_any(plan, clt_effect_has_expose), signals = clt_plan_any(plan, clt_effect_has_signal);
   bool counts = clt_plan_any(plan, clt_effect_has_electrons);
-  self->bands = plan->per_row ? exposure->height : 1;
+  self->bands = plan->per_row ? self->height : 1;
   self->band = clt_alloc((size_t)self->bands, sizeof *self->band);
   exposure->radiance = clt_alloc(cells, sizeof *exposure->radiance);
   exposure->scratch = exposes ? clt_alloc(cells, sizeof *exposure->scratch) : NULL;
@@ -248,8 +273,8 @@ static simulated_camera *create(clt_scene *scene) {
   }
   self->base.driver = &driver;
   self->scene = scene;
-  self->width = description->width * description->camera.cell_pixels;
-  self->height = description->height * description->camera.cell_pixels;
+  self->width = description->camera.width;
+  self->height = description->camera.height;
   self->shutter = (clt_shutter){.frame_ns = llround(description->camera.frame_s * 1e9),
                                 .exposure_s = fmin(description->camera.frame_s, CLT_EXPOSURE_MAX_S),
                                 .delay = scene->exposure_delay};

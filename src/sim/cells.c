@@ -8,7 +8,7 @@
 bool clt_camera_sees(const clt_scene_description *description, const clt_visibility *visibility, int surface,
                      clt_vector at) {
   const clt_pinhole *camera = &description->camera.pinhole;
-  return clt_pinhole_covers(camera, at) &&
+  return clt_optics_covers(camera, description->camera.distortion, at) &&
          vec_dot(vec_sub(camera->position, at), description->surfaces[surface].normal) > 0.0 &&
          !clt_visibility_blocked(visibility, at, camera->position, surface, -1);
 }

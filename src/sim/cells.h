@@ -18,7 +18,7 @@ typedef struct clt_ray_end {
   clt_vector at;  /* the same place, m */
 } clt_ray_end;
 
-/* Whether a camera with a pose of its own sees the front of a surface at a place on it. */
+/* Whether a placed camera sees the front of a surface at a place on it. */
 bool clt_camera_sees(const clt_scene_description *description, const clt_visibility *visibility, int surface,
                      clt_vector at);
 

@@ -7,6 +7,7 @@
 #include "counterlight/image.h"
 #include "counterlight/transport.h"
 #include "sim/geometry.h"
+#include "sim/optics.h"
 
 enum {
   CLT_SURFACES_MAX = 2000,
@@ -24,12 +25,17 @@ typedef struct clt_projector_description {
   int bits;
   double black; /* fraction of full drive that leaks at drive 0: light = black + (1 - black) drive */
   double refresh_s, latency_s;
+  double jitter_s; /* by which the latency varies to either side, by chance */
 } clt_projector_description;
 
 typedef struct clt_camera_description {
-  bool placed;         /* it has a pose of its own; else it stands at the projector and sees all that is lit */
-  clt_pinhole pinhole; /* of a placed camera */
-  int cell_pixels;     /* a cell is cell_pixels x cell_pixels camera pixels */
+  bool placed;         /* it has a view of its own; else it stands at the projector and sees all that is lit */
+  clt_pinhole pinhole; /* of a placed camera, and of one with pixels of its own */
+  int width, height;   /* of its image, pixels */
+  int cell_pixels;     /* a cell is cell_pixels x cell_pixels camera pixels; 1 where they are its own */
+  bool own_pixels;     /* its pixels know no grid: sim/view.h says what they see */
+  int rays;            /* of such a camera: traced per pixel, rays x rays */
+  double distortion[CLT_DISTORTION]; /* of its lens, zeros where it has none: sim/optics.h */
   int bits;
   clt_curve response;
   double responsivity;          /* fraction of full well per radiance and second; 0: chosen to suit the scene */
@@ -50,7 +56,7 @@ typedef struct clt_drift_description {
 } clt_drift_description;
 
 typedef struct clt_faults_description {
-  double dropped, stuck, late; /* probabilities, of a frame */
+  double dropped, stuck, late, torn; /* probabilities, of a frame */
   double late_s;
 } clt_faults_description;
 

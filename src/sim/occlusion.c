@@ -2,11 +2,10 @@
 
 #include "sim/sides.h"
 
-/* Direction through the middle of a cell of a pinhole's picture. */
-static clt_vector middle_of(const clt_scene_description *description, const clt_pinhole *pinhole, int cell) {
-  double x = (2.0 * (cell % description->width) + 1.0) / description->width - 1.0;
-  double y = 1.0 - (2.0 * (cell / description->width) + 1.0) / description->height;
-  return clt_pinhole_direction(pinhole, x, y);
+/* Image coordinates of the middle of a cell of a picture. */
+static void middle_of(const clt_scene_description *description, int cell, double *x, double *y) {
+  *x = (2.0 * (cell % description->width) + 1.0) / description->width - 1.0;
+  *y = 1.0 - (2.0 * (cell / description->width) + 1.0) / description->height;
 }
 
 /* Whether a ray meets a surface and, clearly behind it, the front of another. Surfaces that meet at an edge lie at the
@@ -34,7 +33,12 @@ static void look_at_shadow(const clt_scene_description *description, const clt_v
   int viewed = 0, shadowed = 0;
 #pragma omp parallel for schedule(static) reduction(+ : viewed, shadowed)
   for (int cell = 0; cell < description->width * description->height; cell++) {
-    clt_vector direction = middle_of(description, camera, cell);
+    double x, y;
+    clt_vector direction;
+    middle_of(description, cell, &x, &y);
+    if (!clt_optics_direction(camera, description->camera.distortion, x, y, &direction)) {
+      continue;
+    }
     clt_hit hit = clt_visibility_first_hit(visibility, camera->position, direction, -1);
     clt_vector at = vec_along(camera->position, hit.distance, direction, 0.0, direction);
     if (hit.surface >= 0 && hit.front && clt_pinhole_covers(projector, at) &&
@@ -70,7 +74,9 @@ clt_status clt_occlusion_find(const clt_scene_description *description, const cl
   int shading = 0;
 #pragma omp parallel for schedule(static) reduction(+ : shading)
   for (int cell = 0; cell < cells->count; cell++) {
-    shading += stands_before_a_front(visibility, projector->position, middle_of(description, projector, cell));
+    double x, y;
+    middle_of(description, cell, &x, &y);
+    shading += stands_before_a_front(visibility, projector->position, clt_pinhole_direction(projector, x, y));
   }
   found.shading = shading;
   if (description->camera.placed) {

@@ -68,6 +68,15 @@ static void complete_provenance(clt_scene *scene) {
   clt_curve_format(&scene->description.projector.response, provenance->response, sizeof provenance->response);
 }
 
+/* What the pixels of a camera see that has pixels of its own. */
+static clt_status take_view(clt_scene *scene, clt_error *error) {
+  int64_t start_ns = clt_clock_ns();
+  clt_status status =
+      scene->description.camera.own_pixels ? clt_view_init(&scene->view, &scene->description, error) : CLT_OK;
+  scene->view_ms = 1e3 * clt_clock_since(start_ns);
+  return status;
+}
+
 /* The described responsivity, or one at which the brightest cell fills 0.7 of the well within a refresh period. */
 static double choose_responsivity(const clt_scene *scene) {
   const clt_scene_description *description = &scene->description;
@@ -91,7 +100,8 @@ static clt_status take_transport(clt_scene *scene, clt_error *error) {
 }
 
 static clt_status prepare(clt_scene *scene, const char *path, clt_error *error) {
-  clt_status (*const steps[])(clt_scene *, clt_error *) = {take_transport, take_flood, lay_out_codes, clt_plan_compile};
+  clt_status (*const steps[])(clt_scene *, clt_error *) = {take_transport, take_flood, lay_out_codes, take_view,
+                                                           clt_plan_compile};
   clt_status status = clt_scene_read(path, &scene->description, error);
   for (size_t k = 0; k < sizeof steps / sizeof steps[0] && status == CLT_OK; k++) {
     status = steps[k](scene, error);
@@ -102,7 +112,8 @@ static clt_status prepare(clt_scene *scene, const char *path, clt_error *error) 
   complete_black(scene);
   complete_provenance(scene);
   scene->responsivity = choose_responsivity(scene);
-  scene->timeline = (clt_timeline){.light = clt_plan_light, .context = scene, .values = scene->plan.values};
+  scene->timeline = (clt_timeline){
+      .light = clt_plan_light, .context = scene, .values = scene->plan.values, .layers = scene->plan.layers};
   return clt_timeline_init(&scene->timeline, error);
 }
 
@@ -125,6 +136,7 @@ void clt_scene_close(clt_scene *scene) {
   if (scene != NULL) {
     clt_timeline_finish(&scene->timeline);
     clt_plan_finish(&scene->plan);
+    clt_view_finish(&scene->view);
     free(scene->flood);
     free(scene->added);
     free(scene->drive_of_code);
@@ -163,10 +175,16 @@ void clt_scene_rig_config(const clt_scene *scene, clt_rig_config *config) {
   const clt_scene_description *description = &scene->description;
   *config = (clt_rig_config){.width = description->width,
                              .height = description->height,
-                             .projector = description->projector.response,
+                             .projector = clt_panel_of_curve(&description->projector.response),
                              .camera = description->camera.response,
-                             .latency_s = description->projector.latency_s + description->projector.refresh_s,
+                             .latency_s = description->projector.latency_s + description->projector.jitter_s +
+                                          description->projector.refresh_s,
                              .attempts = 3};
+  if (description->channels == CLT_PANEL_CHANNELS) { /* channels that look alike stay as they are */
+    double light[CLT_PANEL_CHANNELS * CLT_PANEL_CHANNELS];
+    memcpy(light, description->effects.crosstalk, sizeof light);
+    clt_panel_set_crosstalk(&config->projector, light, NULL);
+  }
   choose_exposures(scene, config);
   double longest_s = fmax(config->exposures_s[config->exposure_count - 1], description->camera.frame_s);
   config->timeout_s = 1.0 + config->latency_s + longest_s * (description->camera.exposure_delay + 3);

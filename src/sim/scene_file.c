@@ -100,14 +100,17 @@ static void read_projector(clt_section root, clt_scene_description *description)
   projector->black = clt_read_number(section, "black", 0.001, 0.0, 0.5);
   projector->refresh_s = 1.0 / clt_read_number(section, "refresh_hz", 60.0, 1.0, 1000.0);
   projector->latency_s = 1e-3 * clt_read_number(section, "latency_ms", 30.0, 0.0, 10000.0);
+  projector->jitter_s = 1e-3 * clt_read_number(section, "jitter_ms", 0.0, 0.0, 1000.0);
 }
 
-/* A camera has a pose of its own with position and target, or none of a pose's keys. */
+/* A camera has a pose of its own with position and target, or none of a pose's keys; one with pixels of its own may
+ * have another image angle where the projector stands. */
 static void read_camera_pose(clt_section section, clt_scene_description *description) {
   clt_camera_description *camera = &description->camera;
   bool given = false;
   for (size_t k = 0; k < sizeof geometry_keys / sizeof geometry_keys[0]; k++) {
-    given = given || clt_section_has(section, geometry_keys[k]);
+    bool alone = strcmp(geometry_keys[k], "tangent") == 0 && clt_section_has(section, "pixels");
+    given = given || (clt_section_has(section, geometry_keys[k]) && !alone);
   }
   camera->placed = clt_section_has(section, "position") && clt_section_has(section, "target");
   if (camera->placed) {
@@ -127,7 +130,7 @@ static void read_camera(clt_section root, clt_scene_description *description) {
   } else {
     refuse_geometry(section);
   }
-  camera->cell_pixels = clt_read_integer(section, "cell_pixels", 2, 1, 16);
+  clt_scene_read_pixels(section, description);
   camera->bits = clt_read_integer(section, "bits", 12, 8, 16);
   camera->response = read_curve(section, "linear");
   camera->responsivity =

@@ -21,6 +21,8 @@ typedef struct clt_material {
 int clt_scene_read_materials(clt_section root, clt_scene_description *description, clt_material *materials);
 /* NULL where none of the materials has that name. */
 const clt_material *clt_scene_find_material(const clt_material *materials, int count, const char *name);
+/* The keys of the camera that say what its pixels are; its pose was read. */
+void clt_scene_read_pixels(clt_section section, clt_scene_description *description);
 /* `materials` and `surfaces`; the description's channels are known. */
 void clt_scene_read_surfaces(clt_section root, clt_scene_description *description);
 /* Refuses a projector whose light meets no front of a surface. */

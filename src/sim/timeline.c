@@ -12,7 +12,7 @@ static clt_lighting *take_spare(clt_timeline *timeline) {
     return lighting;
   }
   lighting = clt_alloc(1, sizeof *lighting);
-  float *values = clt_alloc(2 * timeline->values, sizeof *values);
+  float *values = clt_alloc((size_t)(1 + timeline->layers) * timeline->values, sizeof *values);
   if (lighting == NULL || values == NULL) {
     free(lighting);
     free(values);

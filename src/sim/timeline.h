@@ -14,20 +14,21 @@ typedef struct clt_lighting {
   struct clt_lighting *next;
   int64_t lit_ns;
   bool computed;           /* radiance holds its appearance */
-  float *drive, *radiance; /* channels * cells values */
+  float *drive, *radiance; /* values, and layers * values entries */
 } clt_lighting;
 
 typedef struct clt_timeline {
-  /* radiance of the cells under a drive, values entries each */
+  /* radiance of the cells under a drive of values entries */
   void (*light)(void *context, const float *drive, float *radiance);
   void *context;              /* outlives the timeline */
   size_t values;              /* channels * cells */
+  int layers;                 /* the radiance under a drive has so many times as many values */
   clt_lighting *first, *last; /* by ascending time; never empty after init */
   clt_lighting *spare;        /* forgotten ones, to be used again */
 } clt_timeline;
 
-/* Its light, context and values are set. Starts with a dark panel since ever. timeline was zeroed by the caller and is
- * finished by it in either case. */
+/* Its light, context, values and layers are set. Starts with a dark panel since ever. timeline was zeroed by the caller
+ * and is finished by it in either case. */
 clt_status clt_timeline_init(clt_timeline *timeline, clt_error *error);
 void clt_timeline_finish(clt_timeline *timeline);
 

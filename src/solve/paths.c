@@ -9,12 +9,15 @@
 enum { POWER_STEPS = 12, NEGATIVE = 1 << 15 };
 static const double SHIFT = 0.05; /* of the power iteration, relative to the radius */
 
+static double reflected(const clt_matrix *matrix, size_t i, size_t j) {
+  return matrix->entries[i * matrix->count + j] - (i == j);
+}
+
 static void fill_weights(const clt_matrix *matrix, double *weight) {
   for (size_t i = 0; i < matrix->count; i++) {
-    const double *row = matrix->entries + i * matrix->count;
     weight[i] = 0;
     for (size_t j = 0; j < matrix->count; j++) {
-      weight[i] += i == j ? 0 : fabs(row[j]);
+      weight[i] += fabs(reflected(matrix, i, j));
     }
   }
 }
@@ -31,7 +34,7 @@ static double second_moment(const clt_matrix *matrix, const double *weight, doub
     for (size_t i = 0; i < n; i++) {
       y[i] = 0;
       for (size_t j = 0; j < n; j++) {
-        y[i] += i == j ? 0 : weight[i] * fabs(matrix->entries[i * n + j]) * x[j];
+        y[i] += weight[i] * fabs(reflected(matrix, i, j)) * x[j];
       }
       most = fmax(most, y[i] / x[i]);
     }
@@ -45,11 +48,11 @@ static double second_moment(const clt_matrix *matrix, const double *weight, doub
 
 /* Vose's order of Walker's tables: columns below the mean are filled up from one above it. `share` becomes |R_ij| n /
  * |R_i|; stack has n values. */
-static void fill_row(const double *row, size_t n, size_t self, double weight, double *share, size_t *stack, float *keep,
+static void fill_row(const clt_matrix *matrix, size_t i, double weight, double *share, size_t *stack, float *keep,
                      uint16_t *alias) {
-  size_t small = 0, large = n;
+  size_t n = matrix->count, small = 0, large = n;
   for (size_t j = 0; j < n; j++) {
-    share[j] = j == self || weight == 0 ? 0 : fabs(row[j]) * (double)n / weight;
+    share[j] = weight == 0 ? 0 : fabs(reflected(matrix, i, j)) * (double)n / weight;
     stack[share[j] < 1 ? small++ : --large] = j;
     alias[j] = (uint16_t)j;
     keep[j] = 1;
@@ -57,7 +60,7 @@ static void fill_row(const double *row, size_t n, size_t self, double weight, do
   while (small > 0 && large < n) {
     size_t low = stack[--small], high = stack[large];
     keep[low] = (float)share[low];
-    alias[low] = (uint16_t)(high | (row[high] < 0 ? NEGATIVE : 0));
+    alias[low] = (uint16_t)(high | (reflected(matrix, i, high) < 0 ? NEGATIVE : 0));
     share[high] -= 1 - share[low];
     if (share[high] < 1) {
       large++;
@@ -65,7 +68,7 @@ static void fill_row(const double *row, size_t n, size_t self, double weight, do
     }
   }
   for (size_t j = 0; j < n; j++) {
-    keep[j] = row[j] < 0 && j != self ? -keep[j] : keep[j];
+    keep[j] = reflected(matrix, i, j) < 0 ? -keep[j] : keep[j];
   }
 }
 
@@ -75,14 +78,14 @@ static clt_status fill_tables(clt_paths *paths, const clt_matrix *matrix, clt_er
   size_t *stack = clt_alloc(n, sizeof *stack);
   bool room = share != NULL && stack != NULL;
   for (size_t i = 0; i < n && room; i++) {
-    fill_row(matrix->entries + i * n, n, i, paths->weight[i], share, stack, paths->keep + i * n, paths->alias + i * n);
+    fill_row(matrix, i, paths->weight[i], share, stack, paths->keep + i * n, paths->alias + i * n);
   }
   free(share);
   free(stack);
   return room ? CLT_OK : clt_fail(error, CLT_FAILED, "montecarlo: not enough memory for a row of %zu cells", n);
 }
 
-clt_status clt_paths_init(clt_paths *paths, const clt_matrix *matrix, clt_error *error) {
+clt_status clt_paths_init(clt_paths *paths, const clt_matrix *matrix, const char *remedy, clt_error *error) {
   size_t n = paths->count = matrix->count;
   paths->keep = clt_alloc(n * n, sizeof *paths->keep);
   paths->alias = clt_alloc(n * n, sizeof *paths->alias);
@@ -90,10 +93,7 @@ clt_status clt_paths_init(clt_paths *paths, const clt_matrix *matrix, clt_error 
   double *scratch = clt_alloc(2 * n, sizeof *scratch);
   clt_status status = CLT_OK;
   if (paths->keep == NULL || paths->alias == NULL || paths->weight == NULL || scratch == NULL) {
-    status = clt_fail(error, CLT_FAILED,
-                      "montecarlo: not enough memory for the tables of %zu x %zu entries; use pcg or "
-                      "gmres",
-                      n, n);
+    status = clt_fail(error, CLT_FAILED, "montecarlo: not enough memory for the tables of %zu x %zu entries", n, n);
   }
   if (status == CLT_OK && n > 0) {
     fill_weights(matrix, paths->weight);
@@ -102,8 +102,8 @@ clt_status clt_paths_init(clt_paths *paths, const clt_matrix *matrix, clt_error 
                  ? fill_tables(paths, matrix, error)
                  : clt_fail(error, CLT_BAD_INPUT,
                             "montecarlo has no finite variance here: the mean square of its terms grows by %.3g a step "
-                            "and must fall (eq. 48 needs m < 1/2); use direct or auto",
-                            paths->ratio);
+                            "and must fall (%s)",
+                            paths->ratio, remedy);
   }
   free(scratch);
   return status;
@@ -143,14 +143,21 @@ static double follow(const clt_paths *paths, const double *b, size_t from, uint6
   return term * sign * b[cell];
 }
 
-void clt_paths_estimate(const clt_paths *paths, const double *b, int samples, uint64_t key, double *out) {
+void clt_paths_estimate(const clt_paths *paths, const double *b, int samples, uint64_t key, double *out,
+                        double *deviation) {
 #pragma omp parallel for schedule(dynamic, 16)
   for (size_t i = 0; i < paths->count; i++) {
-    double sum = 0;
+    double sum = 0, squares = 0;
     for (int s = 0; s < samples && paths->ratio > 0; s++) {
-      sum += follow(paths, b, i, clt_random_key(key, i * (uint64_t)samples + (uint64_t)s));
+      double value = follow(paths, b, i, clt_random_key(key, i * (uint64_t)samples + (uint64_t)s));
+      sum += value;
+      squares += value * value;
     }
     out[i] = b[i] + sum / samples;
+    if (deviation != NULL) {
+      double spread = samples > 1 ? (squares - sum * sum / samples) / (samples - 1) : INFINITY;
+      deviation[i] = sqrt(fmax(spread, 0) / samples);
+    }
   }
 }
 

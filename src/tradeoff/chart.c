@@ -18,6 +18,8 @@ clt_chart_line *clt_chart_add(clt_chart *chart, const char *format, ...) {
   vsnprintf(line->label, sizeof line->label, format, arguments);
   va_end(arguments);
   line->count = 0;
+  line->colour = chart->count - 1;
+  line->dashed = false;
   return line;
 }
 
@@ -74,9 +76,10 @@ static void print_script(const clt_chart *chart, const char *drawing, FILE *to) 
     fprintf(to, "END\n");
   }
   for (int k = 0; k < chart->count; k++) {
-    fprintf(to, "%s$line%d using 1:2 with linespoints pt 7 ps 0.5 lw 1.5 lc rgb \"%s\" title \"%s\"",
-            k == 0 ? "plot " : ", ", k, colours[(size_t)k % (sizeof colours / sizeof colours[0])],
-            chart->lines[k].label);
+    const clt_chart_line *line = &chart->lines[k];
+    fprintf(to, "%s$line%d using 1:2 with linespoints pt 7 ps 0.5 lw 1.5 dt %d lc rgb \"%s\" title \"%s\"",
+            k == 0 ? "plot " : ", ", k, line->dashed ? 2 : 1,
+            colours[(size_t)line->colour % (sizeof colours / sizeof colours[0])], line->label);
   }
   fprintf(to, "\n");
 }

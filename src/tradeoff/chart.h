@@ -10,6 +10,8 @@ enum { CLT_CHART_LINES_MAX = 12, CLT_CHART_POINTS_MAX = 64, CLT_CHART_LABEL_MAX 
 
 typedef struct clt_chart_line {
   char label[CLT_CHART_LABEL_MAX];
+  int colour;  /* the number of the line that it shares one with; its own at first */
+  bool dashed; /* a bound or another's figures, beside solid lines of what was found */
   int count;
   double x[CLT_CHART_POINTS_MAX], y[CLT_CHART_POINTS_MAX];
 } clt_chart_line;

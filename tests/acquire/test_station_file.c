@@ -43,8 +43,8 @@ static void everything_is_read(void **state) {
   assert_string_equal(config.projector, "simulated");
   assert_string_equal(config.camera, "other");
   assert_true(config.projector_response_given && config.camera_response_given);
-  assert_int_equal(config.rig.projector.kind, CLT_CURVE_GAMMA);
-  assert_near(config.rig.projector.gamma, 2.4, 1e-12);
+  assert_int_equal(config.rig.projector.response[0].kind, CLT_CURVE_GAMMA);
+  assert_near(config.rig.projector.response[0].gamma, 2.4, 1e-12);
   assert_int_equal(config.rig.camera.kind, CLT_CURVE_LINEAR);
   assert_int_equal(config.rig.width, 64);
   assert_int_equal(config.rig.height, 48);

@@ -12,9 +12,10 @@ NAMES = ("interreflection occlusion gloss subsurface defocus projector-black pro
 ALWAYS = {"projector-black", "projector-response", "ambient", "noise", "quantisation", "saturation", "latency"}
 # What the scenes call for beside that; a scene that is not listed is only checked for form.
 INDIRECT, HIDDEN, GLOSSY = {"interreflection"}, {"interreflection", "occlusion"}, {"interreflection", "gloss"}
-CALLED_FOR = {"dihedral": INDIRECT, "corner": INDIRECT, "small": INDIRECT, "flat": set(), "box2": INDIRECT,
+CALLED_FOR = {"book": INDIRECT, "dihedral": INDIRECT, "corner": INDIRECT, "small": INDIRECT, "flat": set(), "box2": INDIRECT,
               "box3": INDIRECT, "box4": INDIRECT, "box5": INDIRECT, "box6": INDIRECT, "cornell": HIDDEN, "dome": HIDDEN,
-              "gallery": HIDDEN, "shadow": HIDDEN, "stage": HIDDEN, "glossy": GLOSSY, "highlight": HIDDEN | GLOSSY}
+              "gallery": HIDDEN, "own_camera": HIDDEN, "shadow": HIDDEN, "stage": HIDDEN,
+              "glossy": GLOSSY, "highlight": HIDDEN | GLOSSY}
 
 
 def explain(path, *options):

@@ -3,8 +3,8 @@ import json
 
 import numpy as np
 
-from support import (SOURCE, PathTest, answer_of, appearance, decode_srgb, main, read_png, room, run, write_png,
-                     write_transport)
+from support import (SOURCE, PathTest, answer_of, appearance, decode_srgb, main, read_png, relative_error, room, run,
+                     write_png, write_transport)
 
 WIDTH, HEIGHT, CELLS = 10, 8, 80
 WALLS = """
@@ -52,6 +52,58 @@ class Analysis(PathTest):
         sign = (-1.0) ** (x + y)
         lost = [np.sort(1 - sign * (dense @ (sign / np.diag(dense))))[CELLS // 2] for dense in self.dense.astype(float)]
         return max(lost, key=abs)
+
+    def forward(self, *options):
+        """What relight --forward writes, [channels, cells], and what it tells."""
+        out = self.folder / "forward.npy"
+        answer = answer_of("relight", self.transport, "--light", self.drive, "-o", out, *options)
+        return np.load(out).reshape(len(self.dense), -1).astype(float), answer["forward"]
+
+    def test_forward_light_is_built_of_bounces(self):
+        for channels, exact in ((1, False), (3, True)):
+            self.given(channels)
+            words = ["--exact-first-bounce"] if exact else []
+            whole = appearance(self.dense, 0, self.x)
+            for count in (0, 1, 5):
+                seen, told = self.forward("--forward", "series", "-n", count, *words)
+                wanted = self.expected(exact, count).sum(axis=0)
+                np.testing.assert_allclose(seen, self.black + wanted, atol=1e-5)
+                self.assertEqual(told["bounces"], count)
+                self.assertAlmostEqual(told["difference"], relative_error(wanted, whole), delta=1e-6)
+                last = self.expected(exact, count)[-1]
+                direct = self.expected(exact, 0)[0]
+                self.assertAlmostEqual(told["last"], np.linalg.norm(last) / np.linalg.norm(direct), delta=1e-6)
+                self.assertAlmostEqual(told["bound"], told["norm"] ** (count + 1) / (1 - told["norm"]), delta=1e-9)
+            seen, told = self.forward("--forward", "iteration", "--tolerance", 1e-7, *words)
+            np.testing.assert_allclose(seen, self.black + whole, rtol=1e-5)
+            self.assertLess(told["difference"], 1e-5)
+            self.assertLessEqual(told["last"], 1e-7)
+
+    def test_forward_paths_know_how_far_off_they_are(self):
+        self.given(3)
+        whole = appearance(self.dense, 0, self.x)
+        for samples in (16, 256):
+            ratios = []
+            for seed in range(4):
+                seen, told = self.forward("--forward", "montecarlo", "--samples", samples, "--seed", seed)
+                off = relative_error(seen - self.black, whole)
+                self.assertAlmostEqual(told["difference"], off, delta=1e-5)
+                ratios.append(off / told["standard_error"])
+            self.assertAlmostEqual(np.mean(ratios), 1, delta=0.15)
+        self.assertGreater(np.linalg.norm(self.forward("--forward", "montecarlo", "--seed", 1)[0] - seen), 0)
+
+    def test_forward_refuses(self):
+        self.given(1)
+        words = ("relight", self.transport, "--light", self.drive, "-o", self.folder / "y.npy")
+        self.refused(*words, "--forward", "magic", names="series, iteration or montecarlo")
+        self.refused(*words, "--forward", "series", "--dual", names="--dual")
+        self.refused(*words, "--forward", "series", "-n", -1, names="bounces")
+        self.refused(*words, "--forward", "montecarlo", "--samples", 0, names="samples")
+        swapped = np.full((1, CELLS, CELLS), 2.0) - np.eye(CELLS)  # A has eigenvalues of 2, though no row of T shows it
+        write_transport(self.transport, swapped, WIDTH, HEIGHT)
+        self.refused(*words, "--forward", "series", names="||A|| is not below 1")
+        self.refused(*words, "--forward", "iteration", names="||A|| is not below 1")
+        self.refused(*words, "--forward", "montecarlo", names="||A|| < 1")
 
     def test_bounces_are_those_of_the_inverse(self):
         for channels, exact in ((1, False), (3, True)):

@@ -28,7 +28,7 @@ static problem problem_of(test_room room) {
   problem of = {.room = room, .count = room.cells};
   take_matrix(&of);
   assert_int_equal(of.matrix.count, of.count);
-  assert_ok(clt_paths_init(&of.paths, &of.matrix, &error), error);
+  assert_ok(clt_paths_init(&of.paths, &of.matrix, "", &error), error);
   of.b = room_numbers(of.count);
   of.answer = room_numbers(of.count);
   of.out = room_numbers(of.count);
@@ -60,7 +60,7 @@ static void problem_free(problem *of) {
 static double mean_square(problem *of, int samples, uint64_t seeds) {
   double sum = 0;
   for (uint64_t seed = 0; seed < seeds; seed++) {
-    clt_paths_estimate(&of->paths, of->b, samples, 1000 * (uint64_t)samples + seed, of->out);
+    clt_paths_estimate(&of->paths, of->b, samples, 1000 * (uint64_t)samples + seed, of->out, NULL);
     for (size_t i = 0; i < of->count; i++) {
       sum += (of->out[i] - of->answer[i]) * (of->out[i] - of->answer[i]);
     }
@@ -77,7 +77,7 @@ static void assert_unbiased(problem *of, const double *wanted, int steps) {
     if (steps > 0) {
       clt_paths_hybrid(&of->paths, of->b, SAMPLES, steps, seed, of->last, of->out);
     } else {
-      clt_paths_estimate(&of->paths, of->b, SAMPLES, seed, of->out);
+      clt_paths_estimate(&of->paths, of->b, SAMPLES, seed, of->out, NULL);
     }
     for (size_t i = 0; i < of->count; i++) {
       sum[i] += of->out[i];
@@ -169,7 +169,7 @@ static void a_final_gather_smooths(void **state) {
   problem of = problem_of(room_cube(8, .4, .2, 5));
   double raw = 0, gathered = 0;
   for (uint64_t seed = 1; seed <= 4; seed++) {
-    clt_paths_estimate(&of.paths, of.b, 30, seed, of.out);
+    clt_paths_estimate(&of.paths, of.b, 30, seed, of.out, NULL);
     raw += room_distance(of.out, of.answer, of.count) / 4;
     memcpy(of.last, of.b, of.count * sizeof *of.last);
     for (size_t i = 0; i < of.count; i++) {
@@ -195,7 +195,7 @@ static void the_number_of_threads_does_not_matter(void **state) {
       if (hybrid) {
         clt_paths_hybrid(&of.paths, of.b, 20, 4, 9, of.last, of.out);
       } else {
-        clt_paths_estimate(&of.paths, of.b, 20, 9, of.out);
+        clt_paths_estimate(&of.paths, of.b, 20, 9, of.out, NULL);
       }
       if (threads == 1) {
         memcpy(one, of.out, of.count * sizeof *one);

@@ -9,10 +9,10 @@
 
 enum { RUNS = 3, SAMPLES = 1 << 10 };
 
-/* Buffers as large as a frame of the camera's pixels, which is as large as any gets. */
+/* Buffers as large as a frame of the camera's pixels, or as the cells where those are more. */
 typedef struct bench {
   clt_scene *scene;
-  size_t values, samples; /* of the cells; of a frame */
+  size_t values, samples; /* of the cells, in all layers; of a frame */
   float *cells, *radiance, *scratch;
   double *electrons, *none;
   clt_exposure exposure;
@@ -32,42 +32,52 @@ static void finish(bench *b) {
 
 static void lay_out(bench *b) {
   const clt_scene_description *description = &b->scene->description;
-  int pixels = description->camera.cell_pixels, channels = description->channels;
-  int split = b->scene->plan.per_row ? pixels : 1, side = b->scene->plan.per_pixel ? pixels : 1;
+  int channels = description->channels, split = b->scene->plan.per_row ? description->camera.cell_pixels : 1;
+  bool pixels = b->scene->plan.per_pixel;
   b->exposure = (clt_exposure){.width = description->width,
                                .height = description->height * split,
                                .channels = channels,
                                .split = split,
                                .radiance = b->radiance,
                                .scratch = b->scratch};
-  b->signal = (clt_signal){.width = description->width * side,
-                           .height = description->height * (side > split ? side : split),
+  b->signal = (clt_signal){.width = pixels ? description->camera.width : description->width,
+                           .height = pixels ? description->camera.height : description->height * split,
                            .channels = channels,
                            .radiance = b->radiance,
                            .scratch = b->scratch,
                            .electrons = b->electrons,
                            .none = b->none};
-  b->band_count = b->scene->plan.per_row ? b->exposure.height : 1;
+  b->band_count = b->scene->plan.per_row ? description->camera.height : 1;
+}
+
+/* Bands that together cover the cells, or each of them all cells where pixels see cells from anywhere. */
+static void lay_out_bands(bench *b) {
+  bool own = b->scene->description.camera.own_pixels;
+  int rows = own ? b->exposure.height : b->exposure.height / b->band_count;
+  for (int k = 0; k < b->band_count; k++) {
+    int first = own ? 0 : k * rows;
+    b->bands[k] = (clt_band){.first = first, .last = first + rows, .start_ns = 0, .end_ns = 16666667};
+  }
 }
 
 static clt_status init(clt_scene *scene, bench *b, clt_error *error) {
   const clt_scene_description *description = &scene->description;
-  size_t side = (size_t)description->camera.cell_pixels;
-  *b = (bench){.scene = scene, .values = scene->plan.values, .samples = scene->plan.values * side * side};
+  size_t pixels = (size_t)description->camera.width * (size_t)description->camera.height;
+  *b = (bench){.scene = scene,
+               .values = scene->plan.values * (size_t)scene->plan.layers,
+               .samples = pixels * (size_t)description->channels};
+  size_t most = b->samples > b->values ? b->samples : b->values;
   b->cells = clt_alloc(2 * b->values, sizeof *b->cells);
-  b->radiance = clt_alloc(b->samples, sizeof *b->radiance);
-  b->scratch = clt_alloc(2 * b->samples, sizeof *b->scratch);
+  b->radiance = clt_alloc(most, sizeof *b->radiance);
+  b->scratch = clt_alloc(2 * most, sizeof *b->scratch);
   b->electrons = clt_alloc(b->samples, sizeof *b->electrons);
   b->none = clt_alloc(b->samples, sizeof *b->none);
-  b->bands = clt_alloc((size_t)description->height * side, sizeof *b->bands);
+  b->bands = clt_alloc((size_t)description->camera.height, sizeof *b->bands);
   if (!b->cells || !b->radiance || !b->scratch || !b->electrons || !b->none || !b->bands) {
     return clt_fail(error, CLT_FAILED, "%s: out of memory for measuring the scene's effects", description->path);
   }
   lay_out(b);
-  for (int k = 0; k < b->band_count; k++) {
-    int rows = b->exposure.height / b->band_count;
-    b->bands[k] = (clt_band){.first = k * rows, .last = (k + 1) * rows, .start_ns = 0, .end_ns = 16666667};
-  }
+  lay_out_bands(b);
   return CLT_OK;
 }
 
@@ -103,11 +113,13 @@ static void run_once(bench *b, const clt_stage *stage) {
   if (effect->light != NULL) {
     effect->light(stage->state, b->cells, b->cells + b->values);
   }
-  if (effect->radiance != NULL) {
-    effect->radiance(stage->state, b->cells, b->scratch);
-  }
-  for (int k = 0; k < b->band_count && effect->expose != NULL; k++) {
-    effect->expose(stage->state, &b->exposure, &b->bands[k]);
+  for (int layer = 0; layer < b->scene->plan.layers; layer++) {
+    if (effect->radiance != NULL) {
+      effect->radiance(stage->state, b->cells, b->scratch);
+    }
+    for (int k = 0; k < b->band_count && effect->expose != NULL; k++) {
+      effect->expose(stage->state, &b->exposure, &b->bands[k]);
+    }
   }
   if (effect->signal != NULL) {
     effect->signal(stage->state, &b->signal);

@@ -113,7 +113,8 @@ clt_status clt_plan_compile(clt_scene *scene, clt_error *error) {
     plan->scratch = plan->work + plan->values;
   }
   plan->per_row = clt_plan_any(plan, tells_rows_apart);
-  plan->per_pixel = clt_plan_any(plan, tells_pixels_apart);
+  plan->per_pixel = description->camera.own_pixels || clt_plan_any(plan, tells_pixels_apart);
+  plan->layers = description->camera.own_pixels ? CLT_VIEW_LAYERS : 1;
   return status;
 }
 
@@ -172,7 +173,12 @@ void clt_plan_light(void *context, const float *drive, float *radiance) {
       plan->stages[k].effect->light(plan->stages[k].state, drive, radiance);
     }
   }
-  clt_plan_radiance(plan, radiance, plan->scratch);
+  if (plan->layers == CLT_VIEW_LAYERS) {
+    clt_view_add_indirect(&scene->view, drive, radiance);
+  }
+  for (int layer = 0; layer < plan->layers; layer++) {
+    clt_plan_radiance(plan, radiance + (size_t)layer * plan->values, plan->scratch);
+  }
 }
 
 clt_fate clt_plan_frame(const clt_plan *plan, uint32_t sequence) {

@@ -9,6 +9,7 @@ typedef struct clt_plan {
   clt_stage stages[CLT_EFFECTS];
   size_t values;           /* channels * cells */
   bool per_row, per_pixel; /* of any stage */
+  int layers;              /* of the radiance: 2 for a camera with pixels of its own (sim/view.h), else 1 */
   float *diagonal;         /* values entries of a diagonal T; NULL where a stage has `light` */
   float *work, *scratch;   /* values and 2 * values; there where a stage has `drive` or `radiance` */
 } clt_plan;
@@ -32,8 +33,8 @@ bool clt_effect_has_electrons(const clt_effect *effect);
 void clt_plan_drive(const clt_plan *plan, float *drive, float *scratch);
 /* What happens to the radiance of the surfaces on its way to the camera, in place. */
 void clt_plan_radiance(const clt_plan *plan, float *radiance, float *scratch);
-/* radiance = what the camera sees under a drive of the panel, black included; context is the scene. One call at a time.
- */
+/* radiance = what the camera sees under a drive of the panel, black included, in as many layers as the plan has;
+ * context is the scene. One call at a time. */
 void clt_plan_light(void *context, const float *drive, float *radiance);
 
 clt_fate clt_plan_frame(const clt_plan *plan, uint32_t sequence);

@@ -15,7 +15,7 @@ static bool called_for(const clt_scene *scene, char *why) {
            line_s > 0.0
                ? "each row of pixels is exposed %.4g us after the one above, the last one %.4g ms after the first"
                : "all rows of pixels are exposed at the same time",
-           1e6 * line_s, 1e3 * line_s * (description->height * description->camera.cell_pixels - 1));
+           1e6 * line_s, 1e3 * line_s * (description->camera.height - 1));
   return line_s > 0.0;
 }
 

@@ -109,5 +109,6 @@ static clt_status compute(const clt_reproduce_options *options, clt_reproduction
 const clt_figure clt_figure_coefficients = {
     .name = "Table 1, Figs. 5 and 6",
     .caption = "Coefficients of the inverse series in powers of A: each term cancels a bounce.",
-    .files = {"fig5.svg", "fig6.svg"},
+    .files = {{"fig5.svg", "Fig. 5: coefficients of S_n^-1.", false},
+              {"fig6.svg", "Fig. 6: coefficients of S_n^-1 S.", false}},
     .compute = compute};

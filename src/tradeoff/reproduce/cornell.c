@@ -5,40 +5,16 @@
 #include <string.h>
 
 #include "base/memory.h"
-#include "tradeoff/reproduce/cube.h"
 #include "tradeoff/reproduce/figures.h"
+#include "tradeoff/reproduce/view.h"
 
-enum { DIVISION = 16, SHOWN = 9, SIDE = 128, CHANNELS = 3, SIDES = 5 };
-
-/* floor, left, back, right, ceiling; the whole stays below the limit of the series. */
-static const double albedo[CHANNELS][CLT_CUBE_SIDES] = {
-    {0.55, 0.6, 0.55, 0.1, 0.55}, {0.55, 0.1, 0.55, 0.5, 0.55}, {0.55, 0.1, 0.55, 0.1, 0.55}};
-
-/* The patch that the middle of a pixel shows; -1 beside the box. The eye stands before the open front. */
-static int seen_patch(const clt_cube *cube, int row, int column) {
-  const clt_vector eye = {0.5, -1.15, 0.5};
-  clt_vector direction = {((column + 0.5) / SIDE - 0.5) * 0.92, 1.0, (0.5 - (row + 0.5) / SIDE) * 0.92};
-  return clt_first_hit(cube->patches, (int)cube->cells, eye, direction, -1).surface;
-}
-
-/* Paints a panel into the strip: light values of every patch in three channels, gain and offset for the eye. */
-static void paint_panel(const int *seen, const double *light, size_t cells, double offset, double gain, int panel,
-                        int line, clt_image *strip) {
-  for (int c = 0; c < CHANNELS; c++) {
-    for (int k = 0; k < SIDE * SIDE; k++) {
-      int row = line * SIDE + k / SIDE, column = panel * SIDE + k % SIDE;
-      double value = seen[k] >= 0 ? offset + gain * light[(size_t)c * cells + (size_t)seen[k]] : 0.0;
-      strip->data[((size_t)c * (size_t)strip->height + (size_t)row) * (size_t)strip->width + (size_t)column] =
-          (float)fmin(fmax(value, 0.0), 1.0);
-    }
-  }
-}
+enum { DIVISION = 16, SHOWN = 9, CHANNELS = CLT_VIEW_CHANNELS, SIDES = CLT_VIEW_SIDES };
 
 /* One channel's series: estimate and term hold n terms; the next are filled in place. */
 static void add_term(const clt_cube *cube, int channel, double *estimate, double *term, double *scratch) {
   double *lit = scratch + 2 * cube->cells;
   memcpy(lit, term, cube->cells * sizeof *lit);
-  clt_cube_illuminate(cube, albedo[channel], lit, scratch);
+  clt_cube_illuminate(cube, clt_room_view_albedo[channel], lit, scratch);
   for (size_t i = 0; i < cube->cells; i++) {
     term[i] -= lit[i];
     estimate[i] += term[i];
@@ -64,8 +40,8 @@ static double mean_error(const clt_cube *cube, const double *estimate, const dou
 }
 
 /* direct, estimate and term: CHANNELS * cells values each; scratch: 3 * cells. */
-static void run_series(const clt_cube *cube, const int *seen, double *direct, double *scratch, clt_image *strip,
-                       clt_reproduction *out) {
+static void run_series(const clt_cube *cube, const clt_room_view *view, double *direct, double *scratch,
+                       clt_image *strip, clt_reproduction *out) {
   size_t cells = cube->cells, values = CHANNELS * cells;
   double *estimate = direct + values, *term = estimate + values, before = 0.0, error = 1.0;
   bool alternates = true;
@@ -73,21 +49,21 @@ static void run_series(const clt_cube *cube, const int *seen, double *direct, do
   for (int c = 0; c < CHANNELS; c++) {
     double *of = estimate + (size_t)c * cells;
     for (size_t i = 0; i < cells; i++) {
-      direct[(size_t)c * cells + i] = of[i] = albedo[c][i / (cells / SIDES)];
+      direct[(size_t)c * cells + i] = of[i] = clt_room_view_albedo[c][i / (cells / SIDES)];
     }
-    clt_cube_illuminate(cube, albedo[c], of, scratch);
+    clt_cube_illuminate(cube, clt_room_view_albedo[c], of, scratch);
   }
   memcpy(term, estimate, values * sizeof *term);
-  paint_panel(seen, direct, cells, 0.0, 0.8, 0, 0, strip);
-  paint_panel(seen, direct, cells, 0.5, 0.0, 0, 1, strip);
+  clt_room_view_paint(view, direct, 0.0, 0.8, 0, 0, strip);
+  clt_room_view_paint(view, direct, 0.5, 0.0, 0, 1, strip);
   for (int n = 0; n < SHOWN - 1; n++) {
     double now = mean_error(cube, estimate, direct);
     alternates = alternates && (n == 0 || now * before < 0.0);
     before = now;
     error = relative_error(estimate, direct, values);
     needed = needed < 0 && error < 0.02 ? n : needed;
-    paint_panel(seen, estimate, cells, 0.0, 0.8, n + 1, 0, strip);
-    paint_panel(seen, term, cells, n > 0 ? 0.5 : 0.0, n > 0 ? 1.0 : 0.8, n + 1, 1, strip);
+    clt_room_view_paint(view, estimate, 0.0, 0.8, n + 1, 0, strip);
+    clt_room_view_paint(view, term, n > 0 ? 0.5 : 0.0, n > 0 ? 1.0 : 0.8, n + 1, 1, strip);
     for (int c = 0; c < CHANNELS; c++) {
       add_term(cube, c, estimate + (size_t)c * cells, term + (size_t)c * cells, scratch);
     }
@@ -100,26 +76,25 @@ static void run_series(const clt_cube *cube, const int *seen, double *direct, do
 
 static clt_status compute(const clt_reproduce_options *options, clt_reproduction *out, clt_error *error) {
   clt_cube cube = {0};
+  clt_room_view view = {0};
   clt_image strip = {0};
   double *vectors = NULL;
-  int *seen = clt_alloc((size_t)SIDE * SIDE, sizeof *seen);
   clt_status status = clt_cube_init(&cube, SIDES, DIVISION, DIVISION, error);
   if (status == CLT_OK) {
-    vectors = clt_alloc((3 * CHANNELS + 3) * cube.cells, sizeof *vectors);
-    status = vectors != NULL && seen != NULL
-                 ? clt_image_init(&strip, CHANNELS, 2 * SIDE, SHOWN * SIDE, error)
-                 : clt_fail(error, CLT_FAILED, "not enough memory for a box of %zu patches", cube.cells);
+    status = clt_room_view_init(&view, &cube, error);
   }
   if (status == CLT_OK) {
-    for (int k = 0; k < SIDE * SIDE; k++) {
-      seen[k] = seen_patch(&cube, k / SIDE, k % SIDE);
-    }
-    run_series(&cube, seen, vectors, vectors + 3 * CHANNELS * cube.cells, &strip, out);
+    vectors = clt_alloc((3 * CHANNELS + 3) * cube.cells, sizeof *vectors);
+    status = vectors != NULL ? clt_image_init(&strip, CHANNELS, 2 * CLT_VIEW_PIXELS, SHOWN * CLT_VIEW_PIXELS, error)
+                             : clt_fail(error, CLT_FAILED, "not enough memory for a box of %zu patches", cube.cells);
+  }
+  if (status == CLT_OK) {
+    run_series(&cube, &view, vectors, vectors + 3 * CHANNELS * cube.cells, &strip, out);
     status = clt_figure_picture(options->folder, "fig7.png", &strip, error);
   }
   clt_image_finish(&strip);
-  free(seen);
   free(vectors);
+  clt_room_view_finish(&view);
   clt_cube_finish(&cube);
   return status;
 }
@@ -128,5 +103,5 @@ const clt_figure clt_figure_cornell = {
     .name = "Fig. 7",
     .caption = "The inverse series on a box with a red and a green wall. Above: the direct light, then what comes of "
                "0, 1, 2 ... terms. Below: each term; grey is 0, cyan and magenta take bled red and green away.",
-    .files = {"fig7.png"},
+    .files = {{"fig7.png", "From left to right: the direct light, and 0 to 7 terms.", true}},
     .compute = compute};

@@ -11,7 +11,7 @@
 #include "tradeoff/reproduce/cube.h"
 #include "tradeoff/reproduce/figures.h"
 
-static const double WANTED = 0.01;
+static const double WANTED = 0.01, REPORT_UNIT_MS = 0.557, LONG_S = 3.0;
 enum { GROWTH_FROM = 5120, ALL_METHODS_UP_TO = 2048 };
 static const double ALBEDO[CLT_CUBE_SIDES] = {0.4, 0.4, 0.4, 0.4, 0.4, 0.4};
 
@@ -31,7 +31,8 @@ typedef struct room {
   size_t cells;
   clt_transport *transport;
   clt_certificate *certificate;
-  double *direct, *seen, *drive; /* l_d, T x for it, and an answer; cells values each */
+  double *direct, *seen, *start,
+      *drive; /* l_d, l_out = T x for it, F^-1 l_out where eq. 43 starts, an answer; cells values each */
 } room;
 
 typedef struct outcome {
@@ -53,6 +54,9 @@ static void light_room(room *of, int width, int columns) {
     of->drive[j] = of->direct[j] / first_bounce[j];
   }
   clt_transport_apply(of->transport, 0, of->drive, of->seen);
+  for (size_t j = 0; j < of->cells; j++) {
+    of->start[j] = of->seen[j] / first_bounce[j];
+  }
 }
 
 static clt_status room_init(room *of, const struct rung *rung, clt_error *error) {
@@ -66,13 +70,14 @@ static clt_status room_init(room *of, const struct rung *rung, clt_error *error)
   if (status == CLT_OK) {
     status = clt_certify(of->transport, &of->certificate, error);
   }
-  of->direct = clt_alloc(3 * of->cells, sizeof *of->direct);
+  of->direct = clt_alloc(4 * of->cells, sizeof *of->direct);
   if (status == CLT_OK && of->direct == NULL) {
     status = clt_fail(error, CLT_FAILED, "not enough memory for %zu patches", of->cells);
   }
   if (status == CLT_OK) {
     of->seen = of->direct + of->cells;
     of->drive = of->seen + of->cells;
+    of->start = of->drive + of->cells;
     light_room(of, 5 * rung->columns, rung->columns);
   }
   return status;
@@ -110,7 +115,8 @@ static void fill_reflected(const room *of, float *reflected) {
 
 /* The report's baseline: eq. 16 by products of matrices, term after term until the error is below 1 %. work: four
  * matrices. */
-static void sum_series(const room *of, float *work, double *light, outcome *found) {
+static clt_status sum_series(const clt_reproduce_options *options, const room *of, float *work, double *light,
+                             outcome *found, clt_error *error) {
   enum { TERMS_MAX = 40 };
   size_t square = of->cells * of->cells;
   blasint side = (blasint)of->cells;
@@ -123,7 +129,8 @@ static void sum_series(const room *of, float *work, double *light, outcome *foun
     sum[i * of->cells + i] = 1.0f;
   }
   found->error = 1.0;
-  for (int n = 1; n <= TERMS_MAX && found->error > WANTED; n++) {
+  clt_status status = CLT_OK;
+  for (int n = 1; n <= TERMS_MAX && found->error > WANTED && status == CLT_OK; n++) {
     float sign = n % 2 == 0 ? 1.0f : -1.0f;
     for (size_t k = 0; k < square; k++) {
       sum[k] += sign * power[k];
@@ -135,7 +142,8 @@ static void sum_series(const room *of, float *work, double *light, outcome *foun
       }
     }
     found->error = error_of(of, light);
-    if (found->error > WANTED) {
+    status = clt_figure_step(options, error, "Fig. 10, N = %zu: series, term %d", of->cells, n);
+    if (found->error > WANTED && status == CLT_OK) {
       cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, side, side, side, 1.0f, power, side, reflected, side, 0.0f,
                   next, side);
       float *swap = power;
@@ -143,14 +151,15 @@ static void sum_series(const room *of, float *work, double *light, outcome *foun
     }
   }
   found->ms = 1e3 * clt_clock_since(start_ns);
+  return status;
 }
 
-static clt_status run_series(const room *of, outcome *found, clt_error *error) {
+static clt_status run_series(const clt_reproduce_options *options, const room *of, outcome *found, clt_error *error) {
   float *work = clt_alloc(4 * of->cells, of->cells * sizeof *work);
   double *light = clt_alloc(of->cells, sizeof *light);
   clt_status status = CLT_OK;
   if (work != NULL && light != NULL) {
-    sum_series(of, work, light, found);
+    status = sum_series(options, of, work, light, found, error);
   } else {
     status = clt_fail(error, CLT_FAILED, "not enough memory for the series of %zu patches; ask for a smaller ladder",
                       of->cells);
@@ -160,9 +169,11 @@ static clt_status run_series(const room *of, outcome *found, clt_error *error) {
   return status;
 }
 
-/* Solves until a tolerance brings the error of l_d below 1 %; the fastest of some solves counts. */
-static clt_status run_method(const room *of, const char *method, outcome *found, clt_error *error) {
-  enum { REPEATS = 5, TOLERANCES = 5 };
+/* Solves from `start` (NULL: zero) until a tolerance brings the error of l_d below 1 %. The fastest of some solves
+ * counts, over seconds `for_s` at least: enough to meet one that nothing else on the machine disturbs. */
+static clt_status run_method(const room *of, const char *method, const double *start, double for_s, outcome *found,
+                             clt_error *error) {
+  enum { REPEATS = 5, REPEATS_MAX = 500, TOLERANCES = 5 };
   double tolerance = WANTED;
   clt_status status = CLT_OK;
   *found = (outcome){.error = 1.0, .ms = INFINITY};
@@ -172,8 +183,9 @@ static clt_status run_method(const room *of, const char *method, outcome *found,
     clt_solve_result result = {0};
     status = clt_solver_create(of->transport, of->certificate, &options, &solver, error);
     found->ms = INFINITY;
-    for (int k = 0; k < REPEATS && status == CLT_OK; k++) {
-      status = clt_solver_run(solver, of->seen, NULL, of->drive, &result, error);
+    int64_t start_ns = clt_clock_ns();
+    for (int k = 0; k < REPEATS_MAX && status == CLT_OK && (k < REPEATS || clt_clock_since(start_ns) < for_s); k++) {
+      status = clt_solver_run(solver, of->seen, start, of->drive, &result, error);
       found->ms = fmin(found->ms, 1e3 * result.method_seconds);
     }
     found->prepare_s = result.prepare_seconds;
@@ -190,7 +202,7 @@ static void find_best(const room *of, outcome *best, const char **name) {
   for (size_t k = 0; clt_method_name(k) != NULL; k++) {
     outcome found;
     bool ready = of->cells <= ALL_METHODS_UP_TO || !clt_method_invests(k) || strcmp(clt_method_name(k), "wavelet") == 0;
-    if (ready && run_method(of, clt_method_name(k), &found, NULL) == CLT_OK && found.error <= WANTED &&
+    if (ready && run_method(of, clt_method_name(k), NULL, 0.1, &found, NULL) == CLT_OK && found.error <= WANTED &&
         found.ms < best->ms) {
       *best = found;
       *name = clt_method_name(k);
@@ -214,33 +226,40 @@ typedef struct ladder {
   outcome series, iterative, wavelet, best; /* of the last rung */
 } ladder;
 
-static clt_status climb(ladder *on, const struct rung *rung, clt_error *error) {
-  static const double report_unit_ms = 0.557;
+static clt_status climb(const clt_reproduce_options *options, ladder *on, const struct rung *rung, clt_error *error) {
   room of = {0};
-  clt_status status = room_init(&of, rung, error);
+  clt_status status = clt_figure_step(options, error, "Fig. 10, N = %d: the box", rung->cells);
   if (status == CLT_OK) {
-    status = run_series(&of, &on->series, error);
+    status = room_init(&of, rung, error);
   }
   if (status == CLT_OK) {
-    status = run_method(&of, "jacobi", &on->iterative, error);
+    status = run_series(options, &of, &on->series, error);
   }
   if (status == CLT_OK) {
-    status = run_method(&of, "wavelet", &on->wavelet, error);
+    status = clt_figure_step(options, error, "Fig. 10, N = %d: iterations", rung->cells);
+  }
+  if (status == CLT_OK) {
+    status = run_method(&of, "jacobi", of.start, LONG_S, &on->iterative, error);
+  }
+  if (status == CLT_OK) {
+    status = run_method(&of, "wavelet", NULL, LONG_S, &on->wavelet, error);
   }
   if (status == CLT_OK) {
     find_best(&of, &on->best, &on->best_method);
     if (on->wavelet.ms < on->best.ms) { /* measured twice */
       on->best = on->wavelet;
       on->best_method = "wavelet";
+    } else if (strcmp(on->best_method, "wavelet") == 0) {
+      on->wavelet = on->best;
     }
   }
   double cells = rung->cells, ms[] = {on->series.ms, on->iterative.ms, on->wavelet.ms, on->best.ms};
   for (int k = 0; k < 4; k++) {
     clt_chart_point(&on->chart.lines[k], cells, ms[k]);
   }
-  clt_chart_point(&on->chart.lines[4], cells, rung->series * report_unit_ms);
-  clt_chart_point(&on->chart.lines[5], cells, rung->iterative * report_unit_ms);
-  clt_chart_point(&on->chart.lines[6], cells, rung->wavelet * report_unit_ms);
+  clt_chart_point(&on->chart.lines[4], cells, rung->series * REPORT_UNIT_MS);
+  clt_chart_point(&on->chart.lines[5], cells, rung->iterative * REPORT_UNIT_MS);
+  clt_chart_point(&on->chart.lines[6], cells, rung->wavelet * REPORT_UNIT_MS);
   room_finish(&of);
   return status;
 }
@@ -253,8 +272,11 @@ static void judge(const ladder *on, const struct rung *last, clt_reproduction *o
            last->iterative / last->wavelet, last->cells);
   clt_reproduced_add(out, "Fig. 10, wavelet", text, wavelet >= last->iterative / last->wavelet,
                      "%.3g times (%.3g ms; made ready in %.3g s)", wavelet, on->wavelet.ms, on->wavelet.prepare_s);
-  clt_reproduced_add(out, "Fig. 10, best of both", "its best is the wavelet method", on->best.ms <= on->wavelet.ms,
-                     "%s: %.3g ms to %.2g %% (made ready in %.3g s)", on->best_method, on->best.ms,
+  snprintf(text, sizeof text, "its best, the wavelets, takes %.3g ms at N = %d", last->wavelet * REPORT_UNIT_MS,
+           last->cells);
+  clt_reproduced_add(out, "Fig. 10, best", text,
+                     on->best.ms < last->wavelet * REPORT_UNIT_MS && on->best.error <= WANTED,
+                     "the best here, %s, takes %.3g ms to %.2g %% (made ready in %.3g s)", on->best_method, on->best.ms,
                      100 * on->best.error, on->best.prepare_s);
   if (last->cells < GROWTH_FROM) { /* what the report says of large sizes */
     return;
@@ -272,16 +294,19 @@ static void judge(const ladder *on, const struct rung *last, clt_reproduction *o
 static clt_status compute(const clt_reproduce_options *options, clt_reproduction *out, clt_error *error) {
   static const char *const lines[] = {"series",         "iteration",         "wavelet",        "best method",
                                       "report: series", "report: iteration", "report: wavelet"};
+  enum { OURS = 4 };
   int largest = options->largest > 0 ? options->largest : rungs[RUNGS - 1].cells, last = 0;
   ladder on = {
       .chart = {
           .title = "Time to an error of 1 %", .across = "patches N", .up = "ms", .log_across = true, .log_up = true}};
   clt_status status = CLT_OK;
   for (size_t k = 0; k < sizeof lines / sizeof lines[0]; k++) {
-    clt_chart_add(&on.chart, "%s", lines[k]);
+    clt_chart_line *line = clt_chart_add(&on.chart, "%s", lines[k]);
+    line->dashed = k >= OURS;
+    line->colour = (int)(k >= OURS ? k - OURS : k);
   }
   for (int k = 0; k < RUNGS && rungs[k].cells <= largest && status == CLT_OK; k++) {
-    status = climb(&on, &rungs[k], error);
+    status = climb(options, &on, &rungs[k], error);
     last = k;
   }
   if (status == CLT_OK) {
@@ -294,6 +319,7 @@ static clt_status compute(const clt_reproduce_options *options, clt_reproduction
 const clt_figure clt_figure_ladder = {
     .name = "Fig. 10",
     .caption = "Series, iteration and wavelets as the transport grows, all to an error of 1 %, beside the report's "
-               "times (Matlab, 2010) and the best method here. Making a method ready is not counted, as there.",
-    .files = {"fig10.svg"},
+               "times (Matlab, 2010) and the best method here. Making a method ready is not counted, as there. What "
+               "else runs on the machine weighs on the iteration, which reads all of T at every step.",
+    .files = {{"fig10.svg", "Time to 1 %, lines of this machine solid, the report's dashed.", true}},
     .compute = compute};

@@ -1,6 +1,7 @@
 #include "tradeoff/reproduce/page.h"
 
 #include <string.h>
+#include <unistd.h>
 
 #include "base/file.h"
 #include "base/page.h"
@@ -14,43 +15,59 @@ static void put_opening(FILE *page, const clt_reproduction *rows) {
   fprintf(page, "<p class=\"lead\"><b>%d of %d</b> claims of the report came out as it says, or better.</p>\n", passed,
           rows->count);
   fputs("<p class=\"soft\">Bai, Chandraker, Ng, Ramamoorthi, A Dual Theory of Inverse and Forward Light Transport "
-        "(UCB/EECS-2010-101): its tables and figures that rest on simulation. Times are of this machine.</p>\n",
+        "(UCB/EECS-2010-101): its tables and figures that rest on simulation, and Figs. 12 and 13 on simulated rooms. "
+        "Times are of this machine; the report's are of Matlab on a processor of 2010.</p>\n",
         page);
 }
 
 static void put_rows(FILE *page, const clt_page_part *part, const clt_reproduction *rows) {
-  fputs("<table><tr><td class=\"soft\">claim<td class=\"soft\">the report<td class=\"soft\">here<td "
-        "class=\"soft\">verdict</tr>\n",
-        page);
+  static const struct {
+    const char *name;
+    int width;
+  } columns[] = {{"claim", 16}, {"the report", 33}, {"here", 42}, {"verdict", 9}};
+  fputs("<table><tr>", page);
+  for (size_t i = 0; i < sizeof columns / sizeof columns[0]; i++) {
+    fprintf(page, "<td class=\"soft\" style=\"width:%d%%\">%s", columns[i].width, columns[i].name);
+  }
+  fputs("</tr>\n", page);
   for (int k = part->first; k < part->last; k++) {
     const clt_reproduced *row = &rows->rows[k];
-    const char *cells[] = {row->name, row->report, row->ours, row->pass ? "as said" : "differs"};
+    const char *cells[] = {row->name, row->report, row->ours};
     fputs("<tr>", page);
     for (size_t i = 0; i < sizeof cells / sizeof cells[0]; i++) {
       fputs("<td>", page);
       clt_page_text(page, cells[i]);
     }
-    fputs("</tr>\n", page);
+    fputs(row->pass ? "<td class=\"n\">as said</tr>\n" : "<td class=\"n lead\"><b>differs</b></tr>\n", page);
   }
   fputs("</table>\n", page);
+}
+
+static clt_status put_picture(FILE *page, const char *path, const clt_figure_file *file, clt_error *error) {
+  bool drawn = strcmp(strrchr(file->name, '.'), ".svg") == 0;
+  fprintf(page, "<figure%s><img alt=\"", file->wide ? " style=\"grid-column:1/-1\"" : "");
+  clt_page_text(page, file->caption);
+  fputs("\" src=\"", page);
+  clt_status status = clt_page_embed(page, path, drawn ? "svg+xml" : "png", error);
+  fputs("\"><figcaption>", page);
+  clt_page_text(page, file->caption);
+  fputs(" <span>", page);
+  clt_page_text(page, file->name);
+  fputs(drawn ? "; its numbers: .csv</span>" : "</span>", page);
+  fputs("</figcaption></figure>\n", page);
+  return status;
 }
 
 /* The files of a part that are there: without gnuplot there are no charts. */
 static clt_status put_pictures(FILE *page, const char *folder, const clt_figure *figure, clt_error *error) {
   clt_status status = CLT_OK;
   fputs("<div class=\"pair\">\n", page);
-  for (int k = 0; k < CLT_FIGURE_FILES && figure->files[k] != NULL && status == CLT_OK; k++) {
+  for (int k = 0; k < CLT_FIGURE_FILES && figure->files[k].name != NULL && status == CLT_OK; k++) {
     char path[CLT_PATH_MAX];
-    const char *ending = strrchr(figure->files[k], '.');
-    status = clt_file_join(folder, figure->files[k], path, error);
-    FILE *there = status == CLT_OK ? fopen(path, "rb") : NULL;
-    if (there == NULL) {
-      continue;
+    status = clt_file_join(folder, figure->files[k].name, path, error);
+    if (status == CLT_OK && access(path, R_OK) == 0) {
+      status = put_picture(page, path, &figure->files[k], error);
     }
-    fclose(there);
-    fprintf(page, "<figure><img alt=\"%s\" src=\"", figure->files[k]);
-    status = clt_page_embed(page, path, strcmp(ending, ".svg") == 0 ? "svg+xml" : "png", error);
-    fprintf(page, "\"><figcaption><span>%s</span></figcaption></figure>\n", figure->files[k]);
   }
   fputs("</div>\n", page);
   return status;
@@ -60,10 +77,11 @@ static clt_status put_parts(FILE *page, const char *folder, const clt_page_part 
                             const clt_reproduction *rows, clt_error *error) {
   clt_status status = CLT_OK;
   for (int k = 0; k < count && status == CLT_OK; k++) {
-    fprintf(page, "<h2>%s</h2>\n<p class=\"soft\">", parts[k].figure->name);
+    fprintf(page, "<h2>%s</h2>\n<p class=\"soft\">", parts[k].figure->name); /* its own words, without < or & */
     clt_page_text(page, parts[k].figure->caption);
     fputs("</p>\n", page);
     put_rows(page, &parts[k], rows);
+    fputs("<p></p>\n", page);
     status = put_pictures(page, folder, parts[k].figure, error);
   }
   return status;

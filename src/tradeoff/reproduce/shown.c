@@ -3,9 +3,13 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/file.h"
 #include "base/memory.h"
+
+enum { GAP = 2 };                    /* black cells between two pictures */
+static const double CLIPPED = 0.005; /* of a picture: a highlight is brighter than white */
 
 clt_status clt_shown_open(const clt_reproduce_options *options, const char *name, clt_shown *shown, clt_error *error) {
   char file[64], path[CLT_PATH_MAX];
@@ -40,20 +44,33 @@ void clt_shown_close(clt_shown *shown) {
   *shown = (clt_shown){0};
 }
 
+static int compare_numbers(const void *left, const void *right) {
+  double a = *(const double *)left, b = *(const double *)right;
+  return (a > b) - (a < b);
+}
+
+/* The value that only CLIPPED of the picture exceeds. */
+static double find_white(const double *values, size_t count, double *sorted) {
+  memcpy(sorted, values, count * sizeof *sorted);
+  qsort(sorted, count, sizeof *sorted, compare_numbers);
+  return fmax(sorted[(size_t)((1 - CLIPPED) * (double)(count - 1))], 1e-30);
+}
+
 clt_status clt_shown_strip(const clt_shown *shown, const double *values, int count, clt_image *strip,
                            clt_error *error) {
-  int width = shown->info.width, height = shown->info.height, channels = shown->info.channels;
-  size_t picture = shown->info.cols * (size_t)channels;
-  clt_status status = clt_image_init(strip, channels, height, count * width, error);
+  size_t width = (size_t)shown->info.width, picture = shown->info.cols * (size_t)shown->info.channels;
+  double *sorted = clt_alloc(picture, sizeof *sorted);
+  clt_status status = sorted != NULL ? clt_image_init(strip, shown->info.channels, shown->info.height,
+                                                      count * (shown->info.width + GAP) - GAP, error)
+                                     : clt_fail(error, CLT_FAILED, "not enough memory for %d pictures", count);
   for (int k = 0; k < count && status == CLT_OK; k++) {
-    double most = 1e-30;
+    const double *panel = values + (size_t)k * picture;
+    double white = find_white(panel, picture, sorted);
     for (size_t i = 0; i < picture; i++) {
-      most = fmax(most, values[(size_t)k * picture + i]);
-    }
-    for (size_t i = 0; i < picture; i++) {
-      size_t row = i / (size_t)width, column = i % (size_t)width + (size_t)(k * width);
-      strip->data[row * (size_t)(count * width) + column] = (float)fmax(values[(size_t)k * picture + i] / most, 0.0);
+      size_t column = i % width + (size_t)k * (width + GAP);
+      strip->data[i / width * (size_t)strip->width + column] = (float)fmin(fmax(panel[i] / white, 0.0), 1.0);
     }
   }
+  free(sorted);
   return status;
 }

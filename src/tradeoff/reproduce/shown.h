@@ -19,8 +19,8 @@ typedef struct clt_shown {
 clt_status clt_shown_open(const clt_reproduce_options *options, const char *name, clt_shown *shown, clt_error *error);
 void clt_shown_close(clt_shown *shown);
 
-/* Paints count pictures (channels * cells values each, in a row in values) side by side, each brightened so that its
- * brightest value is white. strip is initialised here. */
+/* Paints count pictures (channels * cells values each, in a row in values) side by side, each brightened so that half a
+ * percent of its values are white. strip is initialised here. */
 clt_status clt_shown_strip(const clt_shown *shown, const double *values, int count, clt_image *strip, clt_error *error);
 
 #endif
