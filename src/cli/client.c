@@ -96,6 +96,17 @@ static void print_frame(const json_t *frame) {
   putchar('\n');
 }
 
+static void print_verify(const json_t *verify) {
+  const json_t *fits = json_object_get(verify, "fits");
+  printf("verified   the picture is %.2g %% off", 100 * number_of(verify, "error"));
+  if (json_is_boolean(fits)) {
+    printf("; the photograph is %.2g %% off what T predicts, up to %.2g %% is no sign of a change: %s",
+           100 * number_of(verify, "off"), 100 * number_of(verify, "limit"),
+           json_is_true(fits) ? "T fits" : "T no longer fits the room");
+  }
+  putchar('\n');
+}
+
 static void print_status(const json_t *status) {
   const json_t *devices = json_object_get(status, "devices"), *progress = json_object_get(status, "progress");
   print_state(status);
@@ -105,6 +116,9 @@ static void print_status(const json_t *status) {
   printf("content    %s\n", text_of(status, "content"));
   print_transport(json_object_get(status, "transport"));
   print_frame(json_object_get(status, "frame"));
+  if (json_is_object(json_object_get(status, "verify"))) {
+    print_verify(json_object_get(status, "verify"));
+  }
   printf("cost       %s\n", text_of(status, "cost"));
   if (json_is_object(devices)) {
     printf("devices    projector %s, camera %s\n", text_of(devices, "projector"), text_of(devices, "camera"));
@@ -171,8 +185,9 @@ static void print_notification(const json_t *notification, const cli_arguments *
     json_dumpf(notification, stdout, JSON_COMPACT);
     putchar('\n');
   } else if (!arguments->quiet) {
-    bool progress = strcmp(text_of(notification, "method"), "progress") == 0;
-    (progress ? print_progress : print_state)(params);
+    const char *method = text_of(notification, "method");
+    bool progress = strcmp(method, "progress") == 0, verify = strcmp(method, "verify") == 0;
+    (progress ? print_progress : verify ? print_verify : print_state)(params);
   }
   fflush(stdout);
 }

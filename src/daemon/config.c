@@ -58,10 +58,12 @@ static void read_retry(clt_section section, daemon_config *config) {
 static void read_policies(clt_section section, daemon_config *config) {
   static const char *const starts[] = {"acquire", "reuse", NULL};
   static const char *const losses[] = {"hold", NULL};
+  static const char *const misfits[] = {"reacquire", "report", NULL};
   config->reuse = clt_read_choice(section, "at_start", 1, starts) == 1;
   clt_read_choice(section, "on_camera_loss", 0, losses);
   config->verify_s = 60 * clt_read_number(section, "verify_minutes", 60, 0, 525600);
   config->reacquire_error = clt_read_number(section, "reacquire_error", 0, 0, 100);
+  config->on_misfit = (misfit_policy)clt_read_choice(section, "on_misfit", MISFIT_REPORT, misfits);
   read_retry(section, config);
 }
 

@@ -7,6 +7,9 @@
 #include "counterlight/solve.h"
 #include "counterlight/station.h"
 
+/* What follows where a photograph shows that T no longer fits the room. */
+typedef enum misfit_policy { MISFIT_REACQUIRE, MISFIT_REPORT } misfit_policy;
+
 typedef struct daemon_config {
   clt_station_config station;
   char path[CLT_PATH_MAX];    /* of the file itself */
@@ -17,6 +20,7 @@ typedef struct daemon_config {
   bool reuse;                 /* at start a stored transport is used (else a new one is measured) */
   double verify_s;            /* time between verifications, s; 0: none */
   double reacquire_error;     /* a verified error above which the transport is measured again; 0: never */
+  misfit_policy on_misfit;
   double retry_least_s, retry_most_s;
   char method[24]; /* of the solve */
   clt_solve_options solve;

@@ -47,6 +47,7 @@ typedef struct control_findings {
   int width, height, channels; /* of the grid */
   char response[32], source[CLT_TEXT_MAX];
   transport_facts transport;
+  daemon_model *model;      /* the transport itself, held; NULL: none */
   daemon_picture picture;   /* the last drive that was computed */
   uint64_t picture_content; /* content_serial that it is for */
   json_t *tradeoff;         /* what accuracy costs with that picture; NULL: not measured yet */
@@ -55,6 +56,8 @@ typedef struct control_findings {
   clt_image observation; /* of the last verification; may be empty */
   double verified_error; /* < 0: not verified since the picture changed */
   time_t verified;
+  bool checked; /* fit is that of the last verification */
+  clt_fit fit;
   output_frames frames;
   measure_progress progress;
 } control_findings;
@@ -116,6 +119,8 @@ void control_on_request(void *context, client *from, const rpc_request *request)
 /* report.c: new documents. */
 json_t *control_status(const control *self);
 json_t *control_state_note(const control *self);
+/* What the last verification found; null where there is none. */
+json_t *control_verify_note(const control *self);
 /* Paths of the last snapshot. */
 json_t *control_snapshot_note(const control *self);
 json_t *control_progress_note(const measure_progress *progress);

@@ -24,6 +24,7 @@ void control_measure(control *self, measure_kind kind) {
     clt_log(CLT_LOG_ERROR, "the picture cannot be verified: %s", error.message);
     job->kind = MEASURE_NOTHING;
   }
+  job->model = kind == MEASURE_VERIFY ? model_hold(self->found.model) : NULL;
   self->work.measure_number = job->number;
   self->work.measuring = true;
   clt_mailbox_put(self->boxes->measure_jobs, job);
@@ -151,15 +152,30 @@ static void take_rig(control *self, const measure_result *letter) {
   found->calibrated = true;
 }
 
+static void tell_verification(control *self) {
+  const control_findings *found = &self->found;
+  clt_log(CLT_LOG_INFO, "verified: the picture is %.2f %% off, %.2f %% was predicted", 100 * found->verified_error,
+          100 * found->picture.compensation.error_after);
+  if (found->checked) {
+    clt_log(found->fit.fits ? CLT_LOG_INFO : CLT_LOG_WARNING,
+            "the photograph is %.2f %% off what T predicts, up to %.2f %% is its noise and T's own error: %s",
+            100 * found->fit.off, 100 * found->fit.limit, found->fit.fits ? "T fits" : "T no longer fits the room");
+  }
+  server_notify(self->service, "verify", control_verify_note(self));
+}
+
 static machine_event take_verification(control *self, measure_result *letter) {
   clt_image_finish(&self->found.observation);
   self->found.observation = letter->observation;
   letter->observation = (clt_image){0};
   self->found.verified_error = letter->verified_error;
   self->found.verified = time(NULL);
-  clt_log(CLT_LOG_INFO, "verified: the picture is %.2f %% off, %.2f %% was predicted", 100 * letter->verified_error,
-          100 * self->found.picture.compensation.error_after);
-  bool changed = self->config.reacquire_error > 0 && letter->verified_error > self->config.reacquire_error;
+  self->found.checked = letter->checked;
+  self->found.fit = letter->fit;
+  tell_verification(self);
+  bool misfit = letter->checked && !letter->fit.fits;
+  bool changed = (self->config.reacquire_error > 0 && letter->verified_error > self->config.reacquire_error) ||
+                 (misfit && self->config.on_misfit == MISFIT_REACQUIRE);
   self->wishes.acquire = self->wishes.acquire || changed;
   return changed ? EVENT_CHANGED : EVENT_VERIFIED;
 }
@@ -284,6 +300,8 @@ static void take_cost(control *self, solver_result *letter) {
 void control_on_solved(control *self, solver_result *letter) {
   self->work.solving = false;
   self->found.transport = letter->facts;
+  model_drop(self->found.model);
+  self->found.model = model_hold(letter->model);
   switch (letter->kind) {
   case SOLVER_CONTENT:
     take_content(self, letter);
@@ -318,4 +336,5 @@ void control_finish_jobs(control *self) {
   daemon_picture_finish(&self->found.picture);
   clt_image_finish(&self->found.observation);
   json_decref(self->found.tradeoff);
+  model_drop(self->found.model);
 }

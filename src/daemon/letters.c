@@ -105,6 +105,7 @@ void measure_job_free(void *letter) {
   measure_job *gone = letter;
   if (gone != NULL) {
     daemon_picture_finish(&gone->picture);
+    model_drop(gone->model);
     free(gone);
   }
 }
@@ -135,6 +136,7 @@ void solver_result_free(void *letter) {
   solver_result *gone = letter;
   if (gone != NULL) {
     json_decref(gone->tradeoff);
+    model_drop(gone->model);
     daemon_picture_finish(&gone->picture);
     free(gone);
   }

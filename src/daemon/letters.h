@@ -23,6 +23,7 @@
 
 #include "base/mailbox.h"
 #include "counterlight/counterlight.h"
+#include "daemon/model.h"
 
 typedef struct daemon_boxes {
   clt_mailbox *orders;       /* control -> main: output_order */
@@ -114,6 +115,7 @@ typedef struct measure_job {
   clt_station *station;         /* CALIBRATE */
   clt_projector_info projector; /* CALIBRATE */
   daemon_picture picture;       /* VERIFY */
+  daemon_model *model;          /* VERIFY; held; NULL: none in hand */
 } measure_job;
 
 typedef struct measure_progress {
@@ -132,6 +134,8 @@ typedef struct measure_result {
   clt_transport *transport; /* ACQUIRE */
   clt_image observation;    /* VERIFY: radiance */
   double verified_error;    /* VERIFY: ||y - target|| / ||target|| over lit cells */
+  bool checked;             /* VERIFY: fit is known */
+  clt_fit fit;              /* VERIFY: whether the photograph is what T predicts */
 } measure_result;
 
 /* --- solver --- */
@@ -185,6 +189,7 @@ typedef struct solver_result {
   transport_facts facts;      /* LOAD, ADOPT, SOLVE */
   char content[CLT_PATH_MAX]; /* CONTENT: its name */
   json_t *tradeoff;           /* COST */
+  daemon_model *model;        /* in use, held; NULL: none */
 } solver_result;
 
 /* Deep copy; `to` is overwritten. CLT_FAILED where memory is short (then `to` is empty). */

@@ -95,6 +95,20 @@ double measure_error(const clt_image *seen, const clt_image *deviation, const cl
   return wanted > 0 ? sqrt(difference / wanted) : 0;
 }
 
+/* A picture in which no lit cell was seen tells nothing of T: it is verified without. */
+static void check_fit(const measure_job *job, const clt_image *deviation, measure_result *result) {
+  const daemon_model *model = job->model;
+  clt_error problem = {0};
+  if (model == NULL) {
+    return;
+  }
+  result->checked = clt_loop_check(model->transport, model->certificate, &job->picture.drive, &result->observation,
+                                   deviation, &result->fit, &problem) == CLT_OK;
+  if (!result->checked) {
+    clt_log(CLT_LOG_INFO, "whether T still fits is not known: %s", problem.message);
+  }
+}
+
 static clt_status verify(measurer *self, const measure_job *job, measure_result *result) {
   const clt_image *drive = &job->picture.drive;
   clt_image deviation = {0};
@@ -107,6 +121,7 @@ static clt_status verify(measurer *self, const measure_job *job, measure_result 
                             : status;
   if (status == CLT_OK) {
     result->verified_error = measure_error(&result->observation, &deviation, &job->picture.target, &job->picture.lit);
+    check_fit(job, &deviation, result);
   }
   clt_image_finish(&deviation);
   return status;

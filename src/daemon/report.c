@@ -49,6 +49,20 @@ static json_t *transport_note(const transport_facts *transport) {
   return note;
 }
 
+json_t *control_verify_note(const control *self) {
+  const control_findings *found = &self->found;
+  if (found->verified_error < 0) {
+    return json_null();
+  }
+  json_t *note = json_pack("{s:f, s:o}", "error", found->verified_error, "at", iso_time(found->verified));
+  bool known_fit = found->checked;
+  json_object_set_new(note, "off", known_fit ? json_real(found->fit.off) : json_null());
+  json_object_set_new(note, "noise", known_fit ? json_real(found->fit.noise) : json_null());
+  json_object_set_new(note, "limit", known_fit ? json_real(found->fit.limit) : json_null());
+  json_object_set_new(note, "fits", known_fit ? json_boolean(found->fit.fits) : json_null());
+  return note;
+}
+
 static json_t *frame_note(const control_findings *found) {
   const clt_compensation *made = &found->picture.compensation;
   bool compensated = found->picture.compensated;
@@ -98,6 +112,7 @@ json_t *control_status(const control *self) {
   json_object_set_new(status, "content", text_or_null(self->found.content));
   json_object_set_new(status, "transport", transport_note(&self->found.transport));
   json_object_set_new(status, "frame", frame_note(&self->found));
+  json_object_set_new(status, "verify", control_verify_note(self));
   json_object_set_new(status, "cost", json_string(cost));
   json_object_set_new(status, "devices", devices_note(&self->found));
   bool acquiring = self->state == STATE_ACQUIRING && self->found.progress.number != 0;

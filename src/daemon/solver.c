@@ -21,16 +21,15 @@ clt_status solver_init(const daemon_boxes *boxes, const store *state, const char
 
 void solver_finish(solver *self) {
   content_finish(&self->shown);
-  clt_certificate_destroy(self->certificate);
-  clt_transport_destroy(self->transport);
+  model_drop(self->model);
   *self = (solver){0};
 }
 
-static void state_facts(const clt_transport *transport, transport_facts *facts) {
-  facts->present = transport != NULL;
-  if (transport != NULL) {
-    facts->info = clt_transport_describe(transport);
-    facts->origin = *clt_transport_origin(transport);
+static void state_facts(const daemon_model *model, transport_facts *facts) {
+  facts->present = model != NULL;
+  if (model != NULL) {
+    facts->info = clt_transport_describe(model->transport);
+    facts->origin = *clt_transport_origin(model->transport);
   }
 }
 
@@ -88,8 +87,10 @@ static clt_status mark_lit(const clt_certificate *certificate, const clt_image *
   return status;
 }
 
-static clt_status compensate(const solver *self, const solver_job *job, const clt_transport *transport,
-                             const clt_certificate *certificate, daemon_picture *out, clt_error *error) {
+static clt_status compensate(const solver *self, const solver_job *job, const daemon_model *model, daemon_picture *out,
+                             clt_error *error) {
+  const clt_transport *transport = model->transport;
+  const clt_certificate *certificate = model->certificate;
   clt_transport_info info = clt_transport_describe(transport);
   clt_image picture = {0};
   clt_solve_options options = {.method = job->method, .tolerance = job->tolerance, .deadline_s = job->deadline_s};
@@ -114,60 +115,60 @@ static void keep_drive(solver *self, const clt_image *drive) {
 }
 
 static clt_status solve(solver *self, solver_job *job, solver_result *result) {
-  if (self->transport == NULL) {
+  if (self->model == NULL) {
     return leave_uncompensated(self, job, &result->picture, &result->error);
   }
-  clt_status status = compensate(self, job, self->transport, self->certificate, &result->picture, &result->error);
+  clt_status status = compensate(self, job, self->model, &result->picture, &result->error);
   if (status == CLT_OK) {
     keep_drive(self, &result->picture.drive);
   }
   return status;
 }
 
-static void use_transport(solver *self, clt_transport *transport, clt_certificate *certificate) {
-  clt_transport_destroy(self->transport);
-  clt_certificate_destroy(self->certificate);
-  self->transport = transport;
-  self->certificate = certificate;
+static void use_model(solver *self, daemon_model *model) {
+  model_drop(self->model);
+  self->model = model;
 }
 
 /* The transport in hand where it still fits the rig, else a stored one. */
 static clt_status load(solver *self, solver_job *job, solver_result *result) {
-  if (self->transport != NULL) {
-    clt_transport_info info = clt_transport_describe(self->transport);
+  if (self->model != NULL) {
+    clt_transport_info info = clt_transport_describe(self->model->transport);
     if (info.width == job->width && info.height == job->height && info.channels == job->channels) {
       return CLT_OK;
     }
-    use_transport(self, NULL, NULL);
+    use_model(self, NULL);
   }
   clt_transport *stored = store_load_transport(self->state, job->width, job->height, job->channels, job->source);
-  clt_certificate *certificate = NULL;
+  daemon_model *model = NULL;
   if (stored == NULL) {
     return CLT_OK;
   }
-  clt_status status = clt_certify(stored, &certificate, &result->error);
+  clt_status status = model_create(stored, &model, &result->error);
   if (status != CLT_OK) {
     clt_transport_destroy(stored);
     return status;
   }
-  use_transport(self, stored, certificate);
+  use_model(self, model);
   return CLT_OK;
 }
 
 /* The new transport takes the old one's place, in memory and on disk, only after it has served once. */
 static clt_status adopt(solver *self, solver_job *job, solver_result *result) {
-  clt_certificate *certificate = NULL;
+  daemon_model *model = NULL;
   clt_error problem = {0};
-  clt_status status = clt_certify(job->transport, &certificate, &result->error);
-  status =
-      status == CLT_OK ? compensate(self, job, job->transport, certificate, &result->picture, &result->error) : status;
+  clt_status status = model_create(job->transport, &model, &result->error);
   if (status != CLT_OK) {
-    clt_certificate_destroy(certificate);
     return status;
   }
-  use_transport(self, job->transport, certificate);
   job->transport = NULL;
-  if (store_save_transport(self->state, self->transport, &problem) != CLT_OK) {
+  status = compensate(self, job, model, &result->picture, &result->error);
+  if (status != CLT_OK) {
+    model_drop(model);
+    return status;
+  }
+  use_model(self, model);
+  if (store_save_transport(self->state, model->transport, &problem) != CLT_OK) {
     clt_log(CLT_LOG_WARNING, "the new transport is in use and will not survive a restart: %s", problem.message);
   }
   keep_drive(self, &result->picture.drive);
@@ -228,18 +229,18 @@ static bool is_unhurried(void *context, const char *what, int done, int steps) {
 
 static clt_status measure_cost(solver *self, solver_job *job, solver_result *result) {
   clt_error *error = &result->error;
-  if (self->transport == NULL) {
+  if (self->model == NULL) {
     return clt_fail(error, CLT_FAILED, "there is no transport to measure with");
   }
-  clt_transport_info info = clt_transport_describe(self->transport);
+  clt_transport_info info = clt_transport_describe(self->model->transport);
   clt_tradeoff_options options = {
       .white = job->white, .seconds = COST_SECONDS, .brief = true, .progress = is_unhurried, .context = self};
   clt_image picture = {0};
   clt_tradeoff found = {0};
   clt_status status = fit(self, info.width, info.height, info.channels, &picture, error);
-  status = status == CLT_OK
-               ? clt_tradeoff_measure(self->transport, self->certificate, &picture, &options, &found, error)
-               : status;
+  status = status == CLT_OK ? clt_tradeoff_measure(self->model->transport, self->model->certificate, &picture, &options,
+                                                   &found, error)
+                            : status;
   result->tradeoff = status == CLT_OK ? clt_tradeoff_json(&found) : NULL;
   clt_tradeoff_finish(&found);
   clt_image_finish(&picture);
@@ -264,7 +265,8 @@ static void answer(solver *self, solver_job *job) {
   result->kind = job->kind;
   result->number = job->number;
   result->error.status = work(self, job, result);
-  state_facts(self->transport, &result->facts);
+  state_facts(self->model, &result->facts);
+  result->model = model_hold(self->model);
   daemon_report(self->boxes, self->boxes->solved, result);
 }
 

@@ -9,8 +9,7 @@ typedef struct solver {
   const daemon_boxes *boxes;
   const store *state;
   content shown;
-  clt_transport *transport; /* NULL: none in hand */
-  clt_certificate *certificate;
+  daemon_model *model; /* NULL: none in hand */
 } solver;
 
 /* Reads the content; CLT_BAD_INPUT where there is none. boxes and state must outlive the solver. */
