@@ -58,7 +58,7 @@ static void read_retry(clt_section section, daemon_config *config) {
 static void read_policies(clt_section section, daemon_config *config) {
   static const char *const starts[] = {"acquire", "reuse", NULL};
   static const char *const losses[] = {"hold", NULL};
-  static const char *const misfits[] = {"reacquire", "report", NULL};
+  static const char *const misfits[] = {"reacquire", "refine", "report", NULL};
   config->reuse = clt_read_choice(section, "at_start", 1, starts) == 1;
   clt_read_choice(section, "on_camera_loss", 0, losses);
   config->verify_s = 60 * clt_read_number(section, "verify_minutes", 60, 0, 525600);

@@ -8,7 +8,7 @@
 #include "counterlight/station.h"
 
 /* What follows where a photograph shows that T no longer fits the room. */
-typedef enum misfit_policy { MISFIT_REACQUIRE, MISFIT_REPORT } misfit_policy;
+typedef enum misfit_policy { MISFIT_REACQUIRE, MISFIT_REFINE, MISFIT_REPORT } misfit_policy;
 
 typedef struct daemon_config {
   clt_station_config station;

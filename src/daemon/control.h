@@ -22,6 +22,7 @@ typedef struct control_wishes {
   unsigned solver;        /* bit set of solver_kind */
   bool acquire;           /* a new transport is owed, through failures and retries, until it serves */
   bool open;              /* devices to be opened again once `measure` is idle */
+  bool refine;            /* asked for, at the next verification */
   bool snapshot;          /* to be written when the picture has been photographed */
   int content_descriptor; /* of SOLVER_CONTENT; -1: the configured picture */
   char content_name[CLT_PATH_MAX];
@@ -58,6 +59,7 @@ typedef struct control_findings {
   time_t verified;
   bool checked; /* fit is that of the last verification */
   clt_fit fit;
+  refinement refined; /* of the picture that is up; photographs 0: as it was solved for */
   output_frames frames;
   measure_progress progress;
 } control_findings;

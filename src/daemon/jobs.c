@@ -20,11 +20,12 @@ void control_measure(control *self, measure_kind kind) {
   job->config = self->config.station;
   job->station = self->found.devices.station;
   job->projector = self->found.devices.projector;
-  if (kind == MEASURE_VERIFY && daemon_picture_copy(&self->found.picture, &job->picture, &error) != CLT_OK) {
+  bool pictured = kind == MEASURE_VERIFY || kind == MEASURE_REFINE;
+  if (pictured && daemon_picture_copy(&self->found.picture, &job->picture, &error) != CLT_OK) {
     clt_log(CLT_LOG_ERROR, "the picture cannot be verified: %s", error.message);
     job->kind = MEASURE_NOTHING;
   }
-  job->model = kind == MEASURE_VERIFY ? model_hold(self->found.model) : NULL;
+  job->model = pictured ? model_hold(self->found.model) : NULL;
   self->work.measure_number = job->number;
   self->work.measuring = true;
   clt_mailbox_put(self->boxes->measure_jobs, job);
@@ -164,12 +165,43 @@ static void tell_verification(control *self) {
   server_notify(self->service, "verify", control_verify_note(self));
 }
 
-static machine_event take_verification(control *self, measure_result *letter) {
+static void take_photograph(control *self, measure_result *letter) {
   clt_image_finish(&self->found.observation);
   self->found.observation = letter->observation;
   letter->observation = (clt_image){0};
   self->found.verified_error = letter->verified_error;
   self->found.verified = time(NULL);
+}
+
+/* The refined drive goes up. Whether T fits was told by the photograph before. */
+static void take_refinement(control *self, measure_result *letter) {
+  control_findings *found = &self->found;
+  take_photograph(self, letter);
+  found->refined = letter->refined;
+  clt_image_finish(&found->picture.drive);
+  found->picture.drive = letter->drive;
+  letter->drive = (clt_image){0};
+  control_act(self, ACTION_SHOW);
+  clt_log(CLT_LOG_NOTICE,
+          "refined: the picture was %.2f %% off and is %.2f %%, by %d photographs, whose noise is %.2f %%",
+          100 * letter->refined.before, 100 * letter->refined.after, letter->refined.photographs,
+          100 * letter->refined.noise);
+  server_notify(self->service, "verify", control_verify_note(self));
+  control_event(self, EVENT_VERIFIED);
+}
+
+static void refine_or(control *self, bool misfit, machine_event event) {
+  bool wanted = self->wishes.refine || (misfit && self->config.on_misfit == MISFIT_REFINE);
+  self->wishes.refine = false;
+  if (wanted && event == EVENT_VERIFIED && self->state == STATE_VERIFYING && self->found.model != NULL) {
+    control_measure(self, MEASURE_REFINE);
+  } else {
+    control_event(self, event);
+  }
+}
+
+static void take_verification(control *self, measure_result *letter) {
+  take_photograph(self, letter);
   self->found.checked = letter->checked;
   self->found.fit = letter->fit;
   tell_verification(self);
@@ -177,7 +209,7 @@ static machine_event take_verification(control *self, measure_result *letter) {
   bool changed = (self->config.reacquire_error > 0 && letter->verified_error > self->config.reacquire_error) ||
                  (misfit && self->config.on_misfit == MISFIT_REACQUIRE);
   self->wishes.acquire = self->wishes.acquire || changed;
-  return changed ? EVENT_CHANGED : EVENT_VERIFIED;
+  refine_or(self, misfit, changed ? EVENT_CHANGED : EVENT_VERIFIED);
 }
 
 static void take_measured(control *self, measure_result *letter) {
@@ -193,7 +225,10 @@ static void take_measured(control *self, measure_result *letter) {
     control_event(self, EVENT_ACQUIRED);
     break;
   case MEASURE_VERIFY:
-    control_event(self, take_verification(self, letter));
+    take_verification(self, letter);
+    break;
+  case MEASURE_REFINE:
+    take_refinement(self, letter);
     break;
   default:
     break;
@@ -225,6 +260,7 @@ static void take_picture(control *self, solver_result *letter) {
   letter->picture = (daemon_picture){0};
   self->found.picture_content = self->found.content_serial;
   self->found.verified_error = -1;
+  self->found.refined = (refinement){0};
   json_decref(self->found.tradeoff);
   self->found.tradeoff = NULL;
 }

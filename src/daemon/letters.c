@@ -115,6 +115,7 @@ void measure_result_free(void *letter) {
   if (gone != NULL) {
     clt_transport_destroy(gone->transport);
     clt_image_finish(&gone->observation);
+    clt_image_finish(&gone->drive);
     free(gone);
   }
 }

@@ -95,6 +95,7 @@ typedef enum measure_kind {
   MEASURE_CALIBRATE,
   MEASURE_ACQUIRE,
   MEASURE_VERIFY,
+  MEASURE_REFINE,
   MEASURE_STOP
 } measure_kind;
 
@@ -114,8 +115,8 @@ typedef struct measure_job {
   clt_station_config config;    /* CALIBRATE, ACQUIRE */
   clt_station *station;         /* CALIBRATE */
   clt_projector_info projector; /* CALIBRATE */
-  daemon_picture picture;       /* VERIFY */
-  daemon_model *model;          /* VERIFY; held; NULL: none in hand */
+  daemon_picture picture;       /* VERIFY, REFINE */
+  daemon_model *model;          /* VERIFY, REFINE; held; NULL: none in hand */
 } measure_job;
 
 typedef struct measure_progress {
@@ -125,6 +126,12 @@ typedef struct measure_progress {
   double seconds, left;
 } measure_progress;
 
+/* What came of refining; errors are ||y - target|| / ||target|| of photographs, noise is theirs. */
+typedef struct refinement {
+  int photographs; /* 0: not refined */
+  double before, after, noise;
+} refinement;
+
 typedef struct measure_result {
   measure_kind kind;
   uint64_t number;
@@ -132,8 +139,10 @@ typedef struct measure_result {
   clt_rig_info rig; /* CALIBRATE; its texts are the two below */
   char response[32], source[CLT_TEXT_MAX];
   clt_transport *transport; /* ACQUIRE */
-  clt_image observation;    /* VERIFY: radiance */
-  double verified_error;    /* VERIFY: ||y - target|| / ||target|| over lit cells */
+  clt_image observation;    /* VERIFY, REFINE: radiance */
+  double verified_error;    /* VERIFY, REFINE: ||y - target|| / ||target|| over lit cells */
+  refinement refined;       /* REFINE */
+  clt_image drive;          /* REFINE: the better one */
   bool checked;             /* VERIFY: fit is known */
   clt_fit fit;              /* VERIFY: whether the photograph is what T predicts */
 } measure_result;

@@ -8,6 +8,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "daemon/refine.h"
 #include "daemon/standin.h"
 
 /* The least time between two progress letters, s. */
@@ -127,9 +128,37 @@ static clt_status verify(measurer *self, const measure_job *job, measure_result 
   return status;
 }
 
-static clt_status work(measurer *self, const measure_job *job, measure_result *result) {
-  bool observes = job->kind == MEASURE_ACQUIRE || job->kind == MEASURE_VERIFY;
-  if (observes && (self->station == NULL || self->station->rig == NULL)) {
+static bool observes(measure_kind kind) {
+  return kind == MEASURE_ACQUIRE || kind == MEASURE_VERIFY || kind == MEASURE_REFINE;
+}
+
+static bool may_go_on(void *context) {
+  return !cancelled(context);
+}
+
+static clt_status refine(measurer *self, measure_job *job, measure_result *result) {
+  const clt_image *drive = &job->picture.drive;
+  clt_image deviation = {0};
+  clt_error *error = &result->error;
+  if (job->model == NULL) {
+    return clt_fail(error, CLT_FAILED, "there is no transport to refine by");
+  }
+  clt_status status = clt_image_init(&result->observation, drive->channels, drive->height, drive->width, error);
+  status = status == CLT_OK ? clt_image_init(&deviation, drive->channels, drive->height, drive->width, error) : status;
+  status = status == CLT_OK ? refine_picture(self->station->rig, job->model, &job->picture, &result->observation,
+                                             &deviation, may_go_on, self, &result->refined, error)
+                            : status;
+  if (status == CLT_OK) {
+    result->verified_error = result->refined.after;
+    result->drive = job->picture.drive;
+    job->picture.drive = (clt_image){0};
+  }
+  clt_image_finish(&deviation);
+  return status;
+}
+
+static clt_status work(measurer *self, measure_job *job, measure_result *result) {
+  if (observes(job->kind) && (self->station == NULL || self->station->rig == NULL)) {
     return clt_fail(&result->error, CLT_GONE, "the rig is not open");
   }
   switch (job->kind) {
@@ -139,12 +168,14 @@ static clt_status work(measurer *self, const measure_job *job, measure_result *r
     return acquire(self, job, result);
   case MEASURE_VERIFY:
     return verify(self, job, result);
+  case MEASURE_REFINE:
+    return refine(self, job, result);
   default:
     return CLT_OK;
   }
 }
 
-static void answer(measurer *self, const measure_job *job) {
+static void answer(measurer *self, measure_job *job) {
   measure_result *result = clt_alloc(1, sizeof *result);
   if (result == NULL) {
     clt_log(CLT_LOG_ERROR, "measuring: out of memory");
@@ -153,7 +184,7 @@ static void answer(measurer *self, const measure_job *job) {
   result->kind = job->kind;
   result->number = self->number = job->number;
   result->error.status = work(self, job, result);
-  if (job->kind == MEASURE_ACQUIRE || job->kind == MEASURE_VERIFY) {
+  if (observes(job->kind)) {
     standin_release(self->boxes);
   }
   daemon_report(self->boxes, self->boxes->measured, result);

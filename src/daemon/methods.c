@@ -134,6 +134,16 @@ static void answer_snapshot(control *self, client *from, const rpc_request *requ
   control_event(self, EVENT_VERIFY);
 }
 
+/* The picture that is up is photographed, and corrected by what was seen. */
+static void answer_refine(control *self, client *from, const rpc_request *request) {
+  if (self->state != STATE_SHOWING || !self->found.picture.compensated) {
+    server_refuse(from, request, RPC_FAILED, "no compensated picture is up; ask again when the state is \"showing\"");
+    return;
+  }
+  self->wishes.refine = true;
+  accept_event(self, from, request, EVENT_VERIFY);
+}
+
 static void answer_reload(control *self, client *from, const rpc_request *request) {
   clt_error error = {0};
   const char *restart = NULL;
@@ -166,7 +176,7 @@ static const method methods[] = {
     {"show", true, {"path", NULL}, answer_show},  {"hold", true, {NULL}, answer_hold},
     {"resume", true, {NULL}, answer_resume},      {"snapshot", false, {NULL}, answer_snapshot},
     {"reload", true, {NULL}, answer_reload},      {"subscribe", false, {NULL}, answer_subscribe},
-    {"tradeoff", false, {NULL}, answer_tradeoff},
+    {"tradeoff", false, {NULL}, answer_tradeoff}, {"refine", true, {NULL}, answer_refine},
 };
 enum { METHOD_COUNT = sizeof methods / sizeof methods[0] };
 

@@ -60,6 +60,12 @@ json_t *control_verify_note(const control *self) {
   json_object_set_new(note, "noise", known_fit ? json_real(found->fit.noise) : json_null());
   json_object_set_new(note, "limit", known_fit ? json_real(found->fit.limit) : json_null());
   json_object_set_new(note, "fits", known_fit ? json_boolean(found->fit.fits) : json_null());
+  const refinement *refined = &found->refined;
+  json_object_set_new(note, "refined",
+                      refined->photographs > 0
+                          ? json_pack("{s:f, s:f, s:f, s:i}", "before", refined->before, "after", refined->after,
+                                      "noise", refined->noise, "photographs", refined->photographs)
+                          : json_null());
   return note;
 }
 

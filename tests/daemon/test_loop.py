@@ -46,5 +46,58 @@ def one_photograph_tells_whether_the_transport_fits():
         print("fits:", good, "repainted:", bad)
 
 
+def refine(run):
+    with run.client() as client:
+        client.ask("subscribe")
+        assert client.ask("refine")["state"] == "verifying"
+        notes = client.until("showing")
+        return [n["params"] for n in notes if n["method"] == "verify"][-1]
+
+
+def refining_corrects_the_picture_in_place():
+    with exhibit() as run:
+        run.start()
+        run.wait_state("showing")
+        assert verified(run)["refined"] is None
+        run.stop()
+        repaint(run, 0.75)
+        run.start()
+        run.wait_state("showing")
+        before, patterns = verified(run), run.status()["transport"]["patterns"]
+        presented = run.status()["frame"]["presented"]
+        drive = read_drive(run)
+        note = refine(run)
+        done = note["refined"]
+        print("refined:", before["error"], done)
+        assert note["error"] == done["after"] < 0.6 * before["error"], note
+        assert 2 <= done["photographs"] <= 16 < patterns / 10 and done["noise"] > 0
+        assert abs(read_drive(run) - drive).max() > 5, "the refined drive is not the one that is shown"
+        again = verified(run)  # another photograph of the same drive says the same
+        assert again["error"] < 1.2 * done["after"] and again["refined"] == done, (again, done)
+        assert run.status()["frame"]["presented"] > presented
+        assert refine(run)["refined"]["after"] <= 1.2 * done["after"]
+
+
+def a_misfit_refines_where_the_configuration_wants_it():
+    with exhibit() as run:
+        run.start()
+        run.wait_state("showing")
+        run.stop()
+        repaint(run, 0.75)
+        run.write_config(daemon=f'verify_minutes = 0.002; on_misfit = "refine"; {RETRY}')
+        run.start()
+        note = wait_for("a refined picture", lambda: (run.status()["verify"] or {}).get("refined"))
+        assert note["after"] < 0.6 * note["before"], note
+        with run.client() as client:
+            assert client.refused("refine", deep=True)["code"] == -32602
+
+
+def read_drive(run):
+    import test_show
+    with run.client() as client:
+        return 255 * test_show.read_png(client.ask("snapshot")["drive"])
+
+
 if __name__ == "__main__":
-    main([one_photograph_tells_whether_the_transport_fits])
+    main([one_photograph_tells_whether_the_transport_fits, refining_corrects_the_picture_in_place,
+          a_misfit_refines_where_the_configuration_wants_it])
