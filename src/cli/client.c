@@ -107,6 +107,20 @@ static void print_verify(const json_t *verify) {
   putchar('\n');
 }
 
+static void print_reacquired(const json_t *found) {
+  static const char *const sayings[][2] = {{"nothing", "nothing changed"},
+                                           {"gain", "black and gain are new"},
+                                           {"repaint", "the rows of repainted cells are new"},
+                                           {"transport", "all of it was measured"}};
+  const char *done = text_of(found, "done");
+  for (size_t i = 0; i < sizeof sayings / sizeof sayings[0]; i++) {
+    if (strcmp(done, sayings[i][0]) == 0) {
+      printf("reacquired %s, by %.0f patterns; T was %.2g %% off\n", sayings[i][1], number_of(found, "patterns"),
+             100 * number_of(found, "off_before"));
+    }
+  }
+}
+
 static void print_status(const json_t *status) {
   const json_t *devices = json_object_get(status, "devices"), *progress = json_object_get(status, "progress");
   print_state(status);
@@ -118,6 +132,9 @@ static void print_status(const json_t *status) {
   print_frame(json_object_get(status, "frame"));
   if (json_is_object(json_object_get(status, "verify"))) {
     print_verify(json_object_get(status, "verify"));
+  }
+  if (json_is_object(json_object_get(status, "reacquired"))) {
+    print_reacquired(json_object_get(status, "reacquired"));
   }
   printf("cost       %s\n", text_of(status, "cost"));
   if (json_is_object(devices)) {
@@ -180,14 +197,20 @@ static int run_show(const cli_command *command, const cli_arguments *arguments) 
 
 /* One line for a notification, or the document itself. */
 static void print_notification(const json_t *notification, const cli_arguments *arguments) {
-  const json_t *params = json_object_get(notification, "params");
+  static const struct {
+    const char *method;
+    void (*print)(const json_t *params);
+  } prints[] = {
+      {"state", print_state}, {"progress", print_progress}, {"verify", print_verify}, {"reacquired", print_reacquired}};
+  const char *method = text_of(notification, "method");
+  for (size_t i = 0; !arguments->json && !arguments->quiet && i < sizeof prints / sizeof prints[0]; i++) {
+    if (strcmp(method, prints[i].method) == 0) {
+      prints[i].print(json_object_get(notification, "params"));
+    }
+  }
   if (arguments->json) {
     json_dumpf(notification, stdout, JSON_COMPACT);
     putchar('\n');
-  } else if (!arguments->quiet) {
-    const char *method = text_of(notification, "method");
-    bool progress = strcmp(method, "progress") == 0, verify = strcmp(method, "verify") == 0;
-    (progress ? print_progress : verify ? print_verify : print_state)(params);
   }
   fflush(stdout);
 }

@@ -46,10 +46,22 @@ static void load(control *self) {
   }
 }
 
+/* Less than the whole transport is measured only where there is one of this rig to begin with. */
+static measure_kind scope(const control *self) {
+  const control_findings *found = &self->found;
+  bool less = self->wishes.scope == MEASURE_PHOTOMETRY || self->wishes.scope == MEASURE_CHANGED;
+  if (!less || found->model == NULL) {
+    return MEASURE_ACQUIRE;
+  }
+  clt_transport_info info = clt_transport_describe(found->model->transport);
+  bool fits = info.width == found->width && info.height == found->height && info.channels == found->channels;
+  return fits && info.rows == info.cols ? self->wishes.scope : MEASURE_ACQUIRE;
+}
+
 static void acquire(control *self) {
   self->wishes.acquire = true;
   self->found.progress = (measure_progress){0};
-  control_measure(self, MEASURE_ACQUIRE);
+  control_measure(self, scope(self));
 }
 
 static void adopt(control *self) {

@@ -21,6 +21,7 @@ enum { WAITS_FOR_CONTENT = 1, WAITS_FOR_SNAPSHOT = 2, WAITS_FOR_TRADEOFF = 3 };
 typedef struct control_wishes {
   unsigned solver;        /* bit set of solver_kind */
   bool acquire;           /* a new transport is owed, through failures and retries, until it serves */
+  measure_kind scope;     /* of that: MEASURE_PHOTOMETRY, MEASURE_CHANGED, else all of it */
   bool open;              /* devices to be opened again once `measure` is idle */
   bool refine;            /* asked for, at the next verification */
   bool snapshot;          /* to be written when the picture has been photographed */
@@ -54,6 +55,7 @@ typedef struct control_findings {
   json_t *tradeoff;         /* what accuracy costs with that picture; NULL: not measured yet */
   uint64_t content_serial;  /* counts pictures that were asked for */
   char content[CLT_PATH_MAX];
+  renewal renewed;       /* by the last `reacquire` of less than the whole transport */
   clt_image observation; /* of the last verification; may be empty */
   double verified_error; /* < 0: not verified since the picture changed */
   time_t verified;
@@ -123,6 +125,8 @@ json_t *control_status(const control *self);
 json_t *control_state_note(const control *self);
 /* What the last verification found; null where there is none. */
 json_t *control_verify_note(const control *self);
+/* What the last reacquisition of less than the whole transport found; null where there is none. */
+json_t *control_renewed_note(const control *self);
 /* Paths of the last snapshot. */
 json_t *control_snapshot_note(const control *self);
 json_t *control_progress_note(const measure_progress *progress);

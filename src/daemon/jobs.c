@@ -25,7 +25,8 @@ void control_measure(control *self, measure_kind kind) {
     clt_log(CLT_LOG_ERROR, "the picture cannot be verified: %s", error.message);
     job->kind = MEASURE_NOTHING;
   }
-  job->model = pictured ? model_hold(self->found.model) : NULL;
+  bool modelled = pictured || kind == MEASURE_PHOTOMETRY || kind == MEASURE_CHANGED;
+  job->model = modelled ? model_hold(self->found.model) : NULL;
   self->work.measure_number = job->number;
   self->work.measuring = true;
   clt_mailbox_put(self->boxes->measure_jobs, job);
@@ -208,8 +209,33 @@ static void take_verification(control *self, measure_result *letter) {
   bool misfit = letter->checked && !letter->fit.fits;
   bool changed = (self->config.reacquire_error > 0 && letter->verified_error > self->config.reacquire_error) ||
                  (misfit && self->config.on_misfit == MISFIT_REACQUIRE);
+  self->wishes.scope = changed && !self->wishes.acquire ? MEASURE_CHANGED : self->wishes.scope;
   self->wishes.acquire = self->wishes.acquire || changed;
   refine_or(self, misfit, changed ? EVENT_CHANGED : EVENT_VERIFIED);
+}
+
+/* A transport to adopt, or the one in use fits and is solved with again. */
+static void take_renewal(control *self, const measure_result *letter) {
+  static const char *const texts[] = {[RENEW_NONE] = "measured",
+                                      [RENEW_FITS] = "nothing changed",
+                                      [RENEW_GAIN] = "black and gain are new",
+                                      [RENEW_REPAINT] = "rows of repainted cells are new",
+                                      [RENEW_MEASURE] = "all of it was measured"};
+  const renewal *renewed = &letter->renewed;
+  self->found.renewed = *renewed;
+  clt_log(CLT_LOG_NOTICE, "the transport was %.2f %% off where %.2f %% fits: %s, by %d patterns",
+          100 * renewed->before.off, 100 * renewed->before.limit, texts[renewed->outcome], renewed->patterns);
+  server_notify(self->service, "reacquired", control_renewed_note(self));
+  if (letter->transport == NULL) {
+    self->wishes.acquire = false;
+  }
+}
+
+static void take_transport(control *self, measure_result *letter) {
+  clt_transport_destroy(self->wishes.transport);
+  self->wishes.transport = letter->transport;
+  letter->transport = NULL;
+  control_event(self, self->wishes.transport != NULL ? EVENT_ACQUIRED : EVENT_LOADED);
 }
 
 static void take_measured(control *self, measure_result *letter) {
@@ -218,11 +244,13 @@ static void take_measured(control *self, measure_result *letter) {
     take_rig(self, letter);
     control_event(self, EVENT_CALIBRATED);
     break;
+  case MEASURE_PHOTOMETRY:
+  case MEASURE_CHANGED:
+    take_renewal(self, letter);
+    take_transport(self, letter);
+    break;
   case MEASURE_ACQUIRE:
-    clt_transport_destroy(self->wishes.transport);
-    self->wishes.transport = letter->transport;
-    letter->transport = NULL;
-    control_event(self, EVENT_ACQUIRED);
+    take_transport(self, letter);
     break;
   case MEASURE_VERIFY:
     take_verification(self, letter);

@@ -96,6 +96,8 @@ typedef enum measure_kind {
   MEASURE_ACQUIRE,
   MEASURE_VERIFY,
   MEASURE_REFINE,
+  MEASURE_PHOTOMETRY, /* black and gain anew */
+  MEASURE_CHANGED,    /* what changed anew, by a few photographs where they explain it */
   MEASURE_STOP
 } measure_kind;
 
@@ -116,7 +118,7 @@ typedef struct measure_job {
   clt_station *station;         /* CALIBRATE */
   clt_projector_info projector; /* CALIBRATE */
   daemon_picture picture;       /* VERIFY, REFINE */
-  daemon_model *model;          /* VERIFY, REFINE; held; NULL: none in hand */
+  daemon_model *model;          /* VERIFY, REFINE, PHOTOMETRY, CHANGED; held; NULL: none in hand */
 } measure_job;
 
 typedef struct measure_progress {
@@ -132,13 +134,23 @@ typedef struct refinement {
   double before, after, noise;
 } refinement;
 
+typedef enum renew_outcome { RENEW_NONE, RENEW_FITS, RENEW_GAIN, RENEW_REPAINT, RENEW_MEASURE } renew_outcome;
+/* What was found to have changed; before and after: of the photograph that fits worst. */
+typedef struct renewal {
+  renew_outcome outcome;
+  int patterns; /* that it took, those of a whole acquisition included */
+  size_t rows;  /* REPAINT: that got a factor of their own, of all channels */
+  clt_fit before, after;
+} renewal;
+
 typedef struct measure_result {
   measure_kind kind;
   uint64_t number;
   clt_error error;
   clt_rig_info rig; /* CALIBRATE; its texts are the two below */
   char response[32], source[CLT_TEXT_MAX];
-  clt_transport *transport; /* ACQUIRE */
+  clt_transport *transport; /* ACQUIRE, PHOTOMETRY, CHANGED; NULL: the one in use fits */
+  renewal renewed;          /* PHOTOMETRY, CHANGED */
   clt_image observation;    /* VERIFY, REFINE: radiance */
   double verified_error;    /* VERIFY, REFINE: ||y - target|| / ||target|| over lit cells */
   refinement refined;       /* REFINE */

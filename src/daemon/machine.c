@@ -62,6 +62,7 @@ static const machine_transition table[STATE_COUNT][EVENT_COUNT] =
         [STATE_ACQUIRING] =
             {
                 [EVENT_ACQUIRED] = {STATE_SOLVING, ACTION_ADOPT},
+                [EVENT_LOADED] = {STATE_SOLVING, ACTION_SOLVE},
                 [EVENT_SOLVED] = {STATE_ACQUIRING, ACTION_SHOW},
                 [EVENT_FAILED] = {STATE_HOLDING, ACTION_BACK_OFF},
                 [EVENT_LOST] = {STATE_HOLDING, ACTION_BACK_OFF},

@@ -9,6 +9,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "daemon/refine.h"
+#include "daemon/renew.h"
 #include "daemon/standin.h"
 
 /* The least time between two progress letters, s. */
@@ -84,6 +85,25 @@ static clt_status acquire(measurer *self, const measure_job *job, measure_result
   return clt_acquire(self->station->rig, &options, &result->transport, &result->error);
 }
 
+/* Black and flood are photographed so often where the configuration leaves it open. */
+enum { RENEW_REPEATS = 4 };
+
+static clt_status renew(measurer *self, const measure_job *job, measure_result *result) {
+  int repeats = job->config.acquire.repeats;
+  renew_options options = {.changed = job->kind == MEASURE_CHANGED,
+                           .repeats = repeats > 0 ? repeats : RENEW_REPEATS,
+                           .progress = on_progress,
+                           .context = self};
+  self->reported_ns = 0;
+  clt_status status =
+      renew_transport(self->station->rig, job->model, &options, &result->transport, &result->renewed, &result->error);
+  if (status == CLT_OK && result->renewed.outcome == RENEW_MEASURE) {
+    status = acquire(self, job, result);
+    result->renewed.patterns += status == CLT_OK ? clt_transport_origin(result->transport)->patterns : 0;
+  }
+  return status;
+}
+
 double measure_error(const clt_image *seen, const clt_image *deviation, const clt_image *target, const clt_image *lit) {
   double difference = 0, wanted = 0;
   for (size_t i = 0; i < clt_image_size(target); i++) {
@@ -129,7 +149,7 @@ static clt_status verify(measurer *self, const measure_job *job, measure_result 
 }
 
 static bool observes(measure_kind kind) {
-  return kind == MEASURE_ACQUIRE || kind == MEASURE_VERIFY || kind == MEASURE_REFINE;
+  return kind != MEASURE_NOTHING && kind != MEASURE_CALIBRATE && kind != MEASURE_STOP;
 }
 
 static bool may_go_on(void *context) {
@@ -166,6 +186,9 @@ static clt_status work(measurer *self, measure_job *job, measure_result *result)
     return calibrate(self, job, result);
   case MEASURE_ACQUIRE:
     return acquire(self, job, result);
+  case MEASURE_PHOTOMETRY:
+  case MEASURE_CHANGED:
+    return renew(self, job, result);
   case MEASURE_VERIFY:
     return verify(self, job, result);
   case MEASURE_REFINE:

@@ -33,27 +33,42 @@ static void answer_status(control *self, client *from, const rpc_request *reques
   server_reply(from, request, control_status(self));
 }
 
-static void answer_reacquire(control *self, client *from, const rpc_request *request) {
-  static const char *const later[] = {"photometry", "geometry", "changed"};
-  json_t *param = json_object_get(request->params, "scope");
-  const char *scope = param == NULL ? "transport" : json_string_value(param);
-  char message[CLT_MESSAGE_MAX];
-  for (size_t i = 0; scope != NULL && i < sizeof later / sizeof later[0]; i++) {
-    if (strcmp(scope, later[i]) == 0) {
-      snprintf(message, sizeof message, "reacquire: scope \"%s\" is not built yet; \"transport\" is", scope);
-      server_refuse(from, request, RPC_FAILED, message);
-      return;
+/* The kind of measurement that a scope asks for; MEASURE_NOTHING where there is no such scope. */
+static measure_kind scope_kind(const char *scope) {
+  static const struct {
+    const char *name;
+    measure_kind kind;
+  } scopes[] = {{"transport", MEASURE_ACQUIRE},
+                {"photometry", MEASURE_PHOTOMETRY},
+                {"geometry", MEASURE_CALIBRATE},
+                {"changed", MEASURE_CHANGED}};
+  for (size_t i = 0; scope != NULL && i < sizeof scopes / sizeof scopes[0]; i++) {
+    if (strcmp(scope, scopes[i].name) == 0) {
+      return scopes[i].kind;
     }
   }
-  if (scope == NULL || strcmp(scope, "transport") != 0) {
+  return MEASURE_NOTHING;
+}
+
+static void answer_reacquire(control *self, client *from, const rpc_request *request) {
+  json_t *param = json_object_get(request->params, "scope");
+  measure_kind kind = param == NULL ? MEASURE_ACQUIRE : scope_kind(json_string_value(param));
+  if (kind == MEASURE_NOTHING) {
     server_refuse(from, request, RPC_INVALID_PARAMS,
                   "\"scope\" must be \"transport\", \"photometry\", \"geometry\" or \"changed\"");
     return;
   }
-  bool owed = self->wishes.acquire;
+  if (kind == MEASURE_CALIBRATE) {
+    server_refuse(from, request, RPC_FAILED,
+                  "the daemon measures no geometry: run `counterlight calibrate`, then start the daemon again");
+    return;
+  }
+  control_wishes before = self->wishes;
   self->wishes.acquire = true;
+  self->wishes.scope = kind;
   if (!accept_event(self, from, request, EVENT_REACQUIRE)) {
-    self->wishes.acquire = owed;
+    self->wishes.acquire = before.acquire;
+    self->wishes.scope = before.scope;
   }
 }
 

@@ -69,6 +69,21 @@ json_t *control_verify_note(const control *self) {
   return note;
 }
 
+json_t *control_renewed_note(const control *self) {
+  static const char *const names[] = {[RENEW_NONE] = "",
+                                      [RENEW_FITS] = "nothing",
+                                      [RENEW_GAIN] = "gain",
+                                      [RENEW_REPAINT] = "repaint",
+                                      [RENEW_MEASURE] = "transport"};
+  const renewal *renewed = &self->found.renewed;
+  if (renewed->outcome == RENEW_NONE) {
+    return json_null();
+  }
+  return json_pack("{s:s, s:i, s:I, s:f, s:f, s:f, s:b}", "done", names[renewed->outcome], "patterns",
+                   renewed->patterns, "rows", (json_int_t)renewed->rows, "off_before", renewed->before.off, "off_after",
+                   renewed->after.off, "limit", renewed->after.limit, "fits", renewed->after.fits);
+}
+
 static json_t *frame_note(const control_findings *found) {
   const clt_compensation *made = &found->picture.compensation;
   bool compensated = found->picture.compensated;
@@ -119,6 +134,7 @@ json_t *control_status(const control *self) {
   json_object_set_new(status, "transport", transport_note(&self->found.transport));
   json_object_set_new(status, "frame", frame_note(&self->found));
   json_object_set_new(status, "verify", control_verify_note(self));
+  json_object_set_new(status, "reacquired", control_renewed_note(self));
   json_object_set_new(status, "cost", json_string(cost));
   json_object_set_new(status, "devices", devices_note(&self->found));
   bool acquiring = self->state == STATE_ACQUIRING && self->found.progress.number != 0;

@@ -61,19 +61,6 @@ def read_drive_picture(client):
     return 255 * test_show.read_png(client.ask("snapshot")["drive"])
 
 
-def other_scopes_are_told_apart():
-    with exhibit() as run:
-        run.start()
-        run.wait_state("showing")
-        with run.client() as client:
-            for scope in ("photometry", "geometry", "changed"):
-                error = client.refused("reacquire", scope=scope)
-                assert error["code"] == -32000 and "not built yet" in error["message"]
-            for scope in ("everything", 5, None):
-                assert client.refused("reacquire", scope=scope)["code"] == -32602
-            assert client.ask("status")["state"] == "showing"
-
-
 def a_kill_in_the_middle_loses_nothing():
     with exhibit(24, 18) as run:
         run.start()
@@ -223,8 +210,7 @@ def sigterm_ends_it_while_work_goes_on_that_cannot_be_interrupted():
 
 
 if __name__ == "__main__":
-    main([reacquire_keeps_the_picture_and_ends_with_a_newer_transport, other_scopes_are_told_apart,
-          a_kill_in_the_middle_loses_nothing, kills_at_any_time_leave_a_whole_transport,
+    main([reacquire_keeps_the_picture_and_ends_with_a_newer_transport, a_kill_in_the_middle_loses_nothing, kills_at_any_time_leave_a_whole_transport,
           hold_ends_an_acquisition_and_the_picture_comes_back, a_failing_acquisition_leaves_the_earlier_picture_up,
           a_changed_room_is_measured_again_where_the_configuration_wants_it,
           sigterm_ends_it_within_two_seconds_in_every_state,

@@ -1,4 +1,4 @@
-"""The closed loop: whether T still fits the room, told by one photograph."""
+"""The closed loop: whether T still fits the room, told by one photograph, and refining in place."""
 from exhibit import exhibit, main, wait_for
 
 RETRY = "retry_s = [0.05, 0.4];"
