@@ -121,6 +121,15 @@ static void print_reacquired(const json_t *found) {
   }
 }
 
+static void print_drift(const json_t *drift) {
+  if (json_is_object(drift)) {
+    printf("drift      in an hour the error grows by %.2g %% (+- %.2g) and the light by %.2g %% (+- %.2g)%s\n",
+           100 * number_of(drift, "error_per_hour"), 100 * number_of(drift, "error_deviation"),
+           100 * number_of(drift, "brightness_per_hour"), 100 * number_of(drift, "brightness_deviation"),
+           json_is_true(json_object_get(drift, "passes")) ? ": more than the limit" : "");
+  }
+}
+
 static void print_status(const json_t *status) {
   const json_t *devices = json_object_get(status, "devices"), *progress = json_object_get(status, "progress");
   print_state(status);
@@ -133,6 +142,7 @@ static void print_status(const json_t *status) {
   if (json_is_object(json_object_get(status, "verify"))) {
     print_verify(json_object_get(status, "verify"));
   }
+  print_drift(json_object_get(status, "drift"));
   if (json_is_object(json_object_get(status, "reacquired"))) {
     print_reacquired(json_object_get(status, "reacquired"));
   }
@@ -200,8 +210,11 @@ static void print_notification(const json_t *notification, const cli_arguments *
   static const struct {
     const char *method;
     void (*print)(const json_t *params);
-  } prints[] = {
-      {"state", print_state}, {"progress", print_progress}, {"verify", print_verify}, {"reacquired", print_reacquired}};
+  } prints[] = {{"state", print_state},
+                {"progress", print_progress},
+                {"verify", print_verify},
+                {"reacquired", print_reacquired},
+                {"drift", print_drift}};
   const char *method = text_of(notification, "method");
   for (size_t i = 0; !arguments->json && !arguments->quiet && i < sizeof prints / sizeof prints[0]; i++) {
     if (strcmp(method, prints[i].method) == 0) {

@@ -64,6 +64,7 @@ static void read_policies(clt_section section, daemon_config *config) {
   config->verify_s = 60 * clt_read_number(section, "verify_minutes", 60, 0, 525600);
   config->reacquire_error = clt_read_number(section, "reacquire_error", 0, 0, 100);
   config->on_misfit = (misfit_policy)clt_read_choice(section, "on_misfit", MISFIT_REPORT, misfits);
+  config->drift_limit = clt_read_number(section, "drift_limit", 0, 0, 100);
   read_retry(section, config);
 }
 

@@ -21,6 +21,7 @@ typedef struct daemon_config {
   double verify_s;            /* time between verifications, s; 0: none */
   double reacquire_error;     /* a verified error above which the transport is measured again; 0: never */
   misfit_policy on_misfit;
+  double drift_limit; /* of error and brightness in an hour, above which a warning is given; 0: never */
   double retry_least_s, retry_most_s;
   char method[24]; /* of the solve */
   clt_solve_options solve;

@@ -1,6 +1,7 @@
-/* The control loop: owns the state machine and decides what the other threads do. One struct, four files:
+/* The control loop: owns the state machine and decides what the other threads do. One struct, these files:
  * control.c (events of the loop), actions.c (what the machine's actions do), jobs.c (work given to the other threads
- * and its answers), methods.c (what clients may ask), report.c (what they are told). */
+ * and its answers), verdicts.c (what photographs say), methods.c (what clients may ask), report.c (what they are told).
+ */
 #ifndef CLT_DAEMON_CONTROL_H
 #define CLT_DAEMON_CONTROL_H
 
@@ -13,6 +14,7 @@
 #include "daemon/machine.h"
 #include "daemon/notify.h"
 #include "daemon/server.h"
+#include "daemon/trend.h"
 
 /* What a client's deferred reply waits for. */
 enum { WAITS_FOR_CONTENT = 1, WAITS_FOR_SNAPSHOT = 2, WAITS_FOR_TRADEOFF = 3 };
@@ -55,6 +57,8 @@ typedef struct control_findings {
   json_t *tradeoff;         /* what accuracy costs with that picture; NULL: not measured yet */
   uint64_t content_serial;  /* counts pictures that were asked for */
   char content[CLT_PATH_MAX];
+  trend trend;           /* of verifications since the picture was computed */
+  bool drifts;           /* faster than the configuration allows */
   renewal renewed;       /* by the last `reacquire` of less than the whole transport */
   clt_image observation; /* of the last verification; may be empty */
   double verified_error; /* < 0: not verified since the picture changed */
@@ -117,6 +121,11 @@ void control_on_measured(control *self, measure_result *letter);
 void control_on_solved(control *self, solver_result *letter);
 void control_finish_jobs(control *self);
 
+/* verdicts.c */
+void control_on_verification(control *self, measure_result *letter);
+void control_on_refinement(control *self, measure_result *letter);
+void control_on_renewal(control *self, const measure_result *letter);
+
 /* methods.c: a server_handler; context: a control. */
 void control_on_request(void *context, client *from, const rpc_request *request);
 
@@ -125,6 +134,8 @@ json_t *control_status(const control *self);
 json_t *control_state_note(const control *self);
 /* What the last verification found; null where there is none. */
 json_t *control_verify_note(const control *self);
+/* How fast the verifications drift; null where that is not known. */
+json_t *control_drift_note(const control *self);
 /* What the last reacquisition of less than the whole transport found; null where there is none. */
 json_t *control_renewed_note(const control *self);
 /* Paths of the last snapshot. */

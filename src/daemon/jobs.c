@@ -154,83 +154,6 @@ static void take_rig(control *self, const measure_result *letter) {
   found->calibrated = true;
 }
 
-static void tell_verification(control *self) {
-  const control_findings *found = &self->found;
-  clt_log(CLT_LOG_INFO, "verified: the picture is %.2f %% off, %.2f %% was predicted", 100 * found->verified_error,
-          100 * found->picture.compensation.error_after);
-  if (found->checked) {
-    clt_log(found->fit.fits ? CLT_LOG_INFO : CLT_LOG_WARNING,
-            "the photograph is %.2f %% off what T predicts, up to %.2f %% is its noise and T's own error: %s",
-            100 * found->fit.off, 100 * found->fit.limit, found->fit.fits ? "T fits" : "T no longer fits the room");
-  }
-  server_notify(self->service, "verify", control_verify_note(self));
-}
-
-static void take_photograph(control *self, measure_result *letter) {
-  clt_image_finish(&self->found.observation);
-  self->found.observation = letter->observation;
-  letter->observation = (clt_image){0};
-  self->found.verified_error = letter->verified_error;
-  self->found.verified = time(NULL);
-}
-
-/* The refined drive goes up. Whether T fits was told by the photograph before. */
-static void take_refinement(control *self, measure_result *letter) {
-  control_findings *found = &self->found;
-  take_photograph(self, letter);
-  found->refined = letter->refined;
-  clt_image_finish(&found->picture.drive);
-  found->picture.drive = letter->drive;
-  letter->drive = (clt_image){0};
-  control_act(self, ACTION_SHOW);
-  clt_log(CLT_LOG_NOTICE,
-          "refined: the picture was %.2f %% off and is %.2f %%, by %d photographs, whose noise is %.2f %%",
-          100 * letter->refined.before, 100 * letter->refined.after, letter->refined.photographs,
-          100 * letter->refined.noise);
-  server_notify(self->service, "verify", control_verify_note(self));
-  control_event(self, EVENT_VERIFIED);
-}
-
-static void refine_or(control *self, bool misfit, machine_event event) {
-  bool wanted = self->wishes.refine || (misfit && self->config.on_misfit == MISFIT_REFINE);
-  self->wishes.refine = false;
-  if (wanted && event == EVENT_VERIFIED && self->state == STATE_VERIFYING && self->found.model != NULL) {
-    control_measure(self, MEASURE_REFINE);
-  } else {
-    control_event(self, event);
-  }
-}
-
-static void take_verification(control *self, measure_result *letter) {
-  take_photograph(self, letter);
-  self->found.checked = letter->checked;
-  self->found.fit = letter->fit;
-  tell_verification(self);
-  bool misfit = letter->checked && !letter->fit.fits;
-  bool changed = (self->config.reacquire_error > 0 && letter->verified_error > self->config.reacquire_error) ||
-                 (misfit && self->config.on_misfit == MISFIT_REACQUIRE);
-  self->wishes.scope = changed && !self->wishes.acquire ? MEASURE_CHANGED : self->wishes.scope;
-  self->wishes.acquire = self->wishes.acquire || changed;
-  refine_or(self, misfit, changed ? EVENT_CHANGED : EVENT_VERIFIED);
-}
-
-/* A transport to adopt, or the one in use fits and is solved with again. */
-static void take_renewal(control *self, const measure_result *letter) {
-  static const char *const texts[] = {[RENEW_NONE] = "measured",
-                                      [RENEW_FITS] = "nothing changed",
-                                      [RENEW_GAIN] = "black and gain are new",
-                                      [RENEW_REPAINT] = "rows of repainted cells are new",
-                                      [RENEW_MEASURE] = "all of it was measured"};
-  const renewal *renewed = &letter->renewed;
-  self->found.renewed = *renewed;
-  clt_log(CLT_LOG_NOTICE, "the transport was %.2f %% off where %.2f %% fits: %s, by %d patterns",
-          100 * renewed->before.off, 100 * renewed->before.limit, texts[renewed->outcome], renewed->patterns);
-  server_notify(self->service, "reacquired", control_renewed_note(self));
-  if (letter->transport == NULL) {
-    self->wishes.acquire = false;
-  }
-}
-
 static void take_transport(control *self, measure_result *letter) {
   clt_transport_destroy(self->wishes.transport);
   self->wishes.transport = letter->transport;
@@ -246,17 +169,17 @@ static void take_measured(control *self, measure_result *letter) {
     break;
   case MEASURE_PHOTOMETRY:
   case MEASURE_CHANGED:
-    take_renewal(self, letter);
+    control_on_renewal(self, letter);
     take_transport(self, letter);
     break;
   case MEASURE_ACQUIRE:
     take_transport(self, letter);
     break;
   case MEASURE_VERIFY:
-    take_verification(self, letter);
+    control_on_verification(self, letter);
     break;
   case MEASURE_REFINE:
-    take_refinement(self, letter);
+    control_on_refinement(self, letter);
     break;
   default:
     break;
@@ -289,6 +212,8 @@ static void take_picture(control *self, solver_result *letter) {
   self->found.picture_content = self->found.content_serial;
   self->found.verified_error = -1;
   self->found.refined = (refinement){0};
+  self->found.trend = (trend){0};
+  self->found.drifts = false;
   json_decref(self->found.tradeoff);
   self->found.tradeoff = NULL;
 }

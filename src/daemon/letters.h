@@ -156,6 +156,7 @@ typedef struct measure_result {
   refinement refined;       /* REFINE */
   clt_image drive;          /* REFINE: the better one */
   bool checked;             /* VERIFY: fit is known */
+  double brightness;        /* VERIFY, where checked: of the light, of what T predicts */
   clt_fit fit;              /* VERIFY: whether the photograph is what T predicts */
 } measure_result;
 

@@ -116,18 +116,39 @@ double measure_error(const clt_image *seen, const clt_image *deviation, const cl
   return wanted > 0 ? sqrt(difference / wanted) : 0;
 }
 
+/* <seen - b0, T x> / ||T x||^2 over lit cells that were seen; 1 where nothing was predicted. */
+static double find_brightness(const daemon_model *model, const clt_image *predicted, const clt_image *seen,
+                              const clt_image *deviation) {
+  size_t cells = (size_t)seen->height * seen->width;
+  double together = 0, size = 0;
+  for (size_t i = 0; i < clt_image_size(seen); i++) {
+    int c = (int)(i / cells);
+    double black = clt_transport_black(model->transport, c)[i % cells], light = predicted->data[i] - black;
+    if (clt_certificate_lit(model->certificate, c)[i % cells] && isfinite(deviation->data[i])) {
+      together += (seen->data[i] - black) * light;
+      size += light * light;
+    }
+  }
+  return size > 0 ? together / size : 1;
+}
+
 /* A picture in which no lit cell was seen tells nothing of T: it is verified without. */
 static void check_fit(const measure_job *job, const clt_image *deviation, measure_result *result) {
   const daemon_model *model = job->model;
   clt_error problem = {0};
+  clt_image predicted = {0};
   if (model == NULL) {
     return;
   }
-  result->checked = clt_loop_check(model->transport, model->certificate, &job->picture.drive, &result->observation,
+  result->checked = clt_predict(model->transport, &job->picture.drive, &predicted, &problem) == CLT_OK &&
+                    clt_loop_check(model->transport, model->certificate, &job->picture.drive, &result->observation,
                                    deviation, &result->fit, &problem) == CLT_OK;
-  if (!result->checked) {
+  if (result->checked) {
+    result->brightness = find_brightness(model, &predicted, &result->observation, deviation);
+  } else {
     clt_log(CLT_LOG_INFO, "whether T still fits is not known: %s", problem.message);
   }
+  clt_image_finish(&predicted);
 }
 
 static clt_status verify(measurer *self, const measure_job *job, measure_result *result) {

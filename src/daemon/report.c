@@ -69,6 +69,17 @@ json_t *control_verify_note(const control *self) {
   return note;
 }
 
+json_t *control_drift_note(const control *self) {
+  trend_slopes slopes;
+  if (!trend_measure(&self->found.trend, &slopes)) {
+    return json_null();
+  }
+  return json_pack("{s:I, s:f, s:f, s:f, s:f, s:b}", "photographs", (json_int_t)self->found.trend.count,
+                   "error_per_hour", slopes.error, "error_deviation", slopes.error_deviation, "brightness_per_hour",
+                   slopes.brightness, "brightness_deviation", slopes.brightness_deviation, "passes",
+                   self->found.drifts);
+}
+
 json_t *control_renewed_note(const control *self) {
   static const char *const names[] = {[RENEW_NONE] = "",
                                       [RENEW_FITS] = "nothing",
@@ -135,6 +146,7 @@ json_t *control_status(const control *self) {
   json_object_set_new(status, "frame", frame_note(&self->found));
   json_object_set_new(status, "verify", control_verify_note(self));
   json_object_set_new(status, "reacquired", control_renewed_note(self));
+  json_object_set_new(status, "drift", control_drift_note(self));
   json_object_set_new(status, "cost", json_string(cost));
   json_object_set_new(status, "devices", devices_note(&self->found));
   bool acquiring = self->state == STATE_ACQUIRING && self->found.progress.number != 0;

@@ -1,4 +1,8 @@
 """The closed loop: whether T still fits the room, told by one photograph, and refining in place."""
+import time
+
+import numpy
+
 from exhibit import exhibit, main, wait_for
 
 RETRY = "retry_s = [0.05, 0.4];"
@@ -92,6 +96,37 @@ def a_misfit_refines_where_the_configuration_wants_it():
             assert client.refused("refine", deep=True)["code"] == -32602
 
 
+def a_drifting_lamp_is_told_by_the_trend():
+    with exhibit() as run:
+        run.start()
+        run.wait_state("showing")
+        assert run.status()["drift"] is None
+        run.stop()
+        # Half the lamp, so that the error is that of the brightness, and less from second to second of the scene's clock.
+        (run.folder / "room.cfg").write_text((run.folder / "room.cfg").read_text().replace(
+            "intensity = 40.0;", "intensity = 20.0; drift = { per_hour = -1; };"))
+        run.write_config(daemon=f"verify_minutes = 0.0005; drift_limit = 0.5; {RETRY}")
+        run.start()
+        times, errors, warned = [], [], []
+        with run.client() as client:
+            client.ask("subscribe")
+            while len(times) < 24 or not warned:
+                note = client.next()
+                if note["method"] == "verify":
+                    times.append(time.monotonic() / 3600)
+                    errors.append(note["params"]["error"])
+                elif note["method"] == "drift":
+                    warned.append(note["params"])
+            drift = client.ask("status")["drift"]
+        print("drift:", drift)
+        assert warned[0]["passes"] and warned[0]["photographs"] >= 4 and drift["photographs"] >= 24, (warned, drift)
+        slope = numpy.polyfit(times[-24:], errors[-24:], 1)[0]
+        assert slope > 0 and abs(drift["error_per_hour"] / slope - 1) < 0.2, (drift, slope)
+        assert abs(drift["brightness_per_hour"] / drift["error_per_hour"] + 1) < 0.1, drift
+        assert drift["brightness_deviation"] < 0.3 * -drift["brightness_per_hour"], drift
+        assert "drift: in an hour" in run.said()
+
+
 def read_drive(run):
     import test_show
     with run.client() as client:
@@ -100,4 +135,4 @@ def read_drive(run):
 
 if __name__ == "__main__":
     main([one_photograph_tells_whether_the_transport_fits, refining_corrects_the_picture_in_place,
-          a_misfit_refines_where_the_configuration_wants_it])
+          a_misfit_refines_where_the_configuration_wants_it, a_drifting_lamp_is_told_by_the_trend])
