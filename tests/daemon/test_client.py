@@ -73,7 +73,10 @@ def reacquire_waits_and_fails_where_it_failed():
             assert json.loads(line)["method"] in ("state", "progress")
         assert run.status()["transport"]["grid"] == first["transport"]["grid"]
         code, _, said = counterlight(run, "reacquire", "--scope", "geometry")
-        assert code == 1 and "not built yet" in said
+        assert code == 1 and "counterlight calibrate" in said
+        lines = good(run, "reacquire", "--scope", "changed", "--wait").strip().split("\n")
+        assert any(line.startswith("reacquired nothing changed, by 10 patterns") for line in lines), lines
+        assert "reacquired nothing changed" in good(run, "status")
         code, _, said = counterlight(run, "reacquire", "--scope", "all")
         assert code == 2 and "scope" in said
         run.stop()

@@ -28,7 +28,8 @@ def malformed_half_and_unknown_requests_are_answered():
                 reply = client.line()
                 assert reply["error"]["code"] == code, (data[:60], reply)
             error = client.refused("no-such-method")
-            for name in ("status", "reacquire", "show", "hold", "resume", "snapshot", "reload", "subscribe", "tradeoff"):
+            for name in ("status", "reacquire", "show", "hold", "resume", "refine", "snapshot", "reload", "subscribe",
+                         "tradeoff"):
                 assert name in error["message"], error
             text = request("status")
             for at in range(1, len(text)):
