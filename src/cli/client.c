@@ -1,4 +1,4 @@
-/* counterlight status, reacquire, show, watch, snapshot, hold, resume, reload: talk to a running daemon. */
+/* counterlight status, reacquire, refine, show, watch, snapshot, hold, resume, reload: talk to a running daemon. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -361,6 +361,11 @@ const cli_command cli_command_hold = {.name = "hold",
                                       .summary = "have the running daemon leave the picture as it is",
                                       .options = socket_only,
                                       .run = run_state};
+const cli_command cli_command_refine = {.name = "refine",
+                                        .synopsis = "[--socket PATH]",
+                                        .summary = "have the running daemon correct its picture by photographs of it",
+                                        .options = socket_only,
+                                        .run = run_state};
 const cli_command cli_command_resume = {.name = "resume",
                                         .synopsis = "[--socket PATH]",
                                         .summary = "have the running daemon go on after hold",

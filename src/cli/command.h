@@ -69,8 +69,9 @@ extern const cli_command cli_command_demo, cli_command_acquire, cli_command_comp
     cli_command_bounces, cli_command_separate, cli_command_repaint, cli_command_inspect, cli_command_tradeoff,
     cli_command_reproduce, cli_command_simulate, cli_command_scene, cli_command_calibrate;
 
-/* The commands that talk to a running daemon (client.c): status reacquire show watch snapshot hold resume reload. */
-extern const cli_command cli_command_status, cli_command_reacquire, cli_command_show, cli_command_watch,
-    cli_command_snapshot, cli_command_hold, cli_command_resume, cli_command_reload;
+/* The commands that talk to a running daemon (client.c): status reacquire refine show watch snapshot hold resume
+ * reload. */
+extern const cli_command cli_command_status, cli_command_reacquire, cli_command_refine, cli_command_show,
+    cli_command_watch, cli_command_snapshot, cli_command_hold, cli_command_resume, cli_command_reload;
 
 #endif

@@ -5,7 +5,7 @@ import unittest
 
 PROGRAM = sys.argv[1]
 COMMANDS = ("demo calibrate acquire compensate relight bounces separate repaint inspect tradeoff reproduce simulate scene "
-            "status show watch reacquire snapshot hold resume reload").split()
+            "status show watch reacquire refine snapshot hold resume reload").split()
 
 
 def run(*words):
