@@ -80,6 +80,7 @@ def refining_corrects_the_picture_in_place():
         assert again["error"] < 1.2 * done["after"] and again["refined"] == done, (again, done)
         assert run.status()["frame"]["presented"] > presented
         assert refine(run)["refined"]["after"] <= 1.2 * done["after"]
+        assert run.stop()[0] == 0
 
 
 def a_misfit_refines_where_the_configuration_wants_it():

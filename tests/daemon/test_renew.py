@@ -46,6 +46,7 @@ def a_repainted_region_is_found_and_its_rows_alone_change():
         assert abs(inside - 0.6).max() < 0.03, inside
         ratio[:, 3:7, 2:7] = 1
         assert abs(ratio - 1).max() < 0.03 and found["rows"] >= inside.size, (found, ratio)
+        assert run.stop()[0] == 0
 
 
 def a_dimmer_lamp_is_found_by_either_scope():
