@@ -111,7 +111,9 @@ clt_rig_config clt_station_rig_config(const clt_station_config *config, const cl
   if (station->calibration != NULL) {
     clt_calibration_apply(station->calibration, &measured);
   }
-  measured.verify = rig.verify;
+  /* A cell's mean moves with the exposure where some of its pixels saturate: only whole-factor cells, whose pixels see
+   * the same light, are sure to agree. */
+  measured.verify = config->verify_given ? rig.verify : station->calibration == NULL;
   measured.patch = rig.patch;
   if (rig.width != 0) {
     measured.width = rig.width;

@@ -14,7 +14,7 @@ static const char *const scheme_names[] = {"auto", "brute", "hadamard", "hierarc
 
 /* What a configuration holds that says nothing: everything from the scene. */
 static void set_defaults(clt_station_config *config) {
-  *config = (clt_station_config){.projector = SIMULATED, .camera = SIMULATED, .rig = {.latency_s = -1, .verify = true}};
+  *config = (clt_station_config){.projector = SIMULATED, .camera = SIMULATED, .rig.latency_s = -1};
   snprintf(config->scheme, sizeof config->scheme, "%s", scheme_names[0]);
 }
 
@@ -60,7 +60,7 @@ static void read_rig(clt_section section, clt_rig_config *rig) {
   rig->latency_s = latency_ms < 0 ? -1 : latency_ms * MS;
   rig->timeout_s = clt_read_number(section, "timeout_ms", 0, 1, 600000) * MS;
   rig->attempts = clt_read_integer(section, "attempts", 0, 1, 100);
-  rig->verify = clt_read_flag(section, "verify", true); /* of one exposure there is nothing to verify */
+  rig->verify = clt_read_flag(section, "verify", false);
   read_patch(clt_section_group(section, "patch"), &rig->patch);
 }
 
@@ -111,6 +111,7 @@ clt_status clt_station_read(const char *path, clt_station_config *config, clt_er
   config->rig.projector = clt_panel_of_curve(&panel);
   read_device(clt_section_group(root, "camera"), config->camera, sizeof config->camera, &config->rig.camera,
               &config->camera_response_given);
+  config->verify_given = clt_section_has(clt_section_group(root, "rig"), "verify");
   read_rig(clt_section_group(root, "rig"), &config->rig);
   read_acquire(clt_section_group(root, "acquire"), config);
   clt_section_leave(root, "daemon");
