@@ -8,6 +8,8 @@
 #include "base/page.h"
 #include "cli/calibrate_report.h"
 
+enum { REGIONS_SHOWN = 6 };
+
 static void put_row(FILE *page, const char *what, const char *remark, const char *format, ...) CLT_PRINTF(4, 5);
 static void put_row(FILE *page, const char *what, const char *remark, const char *format, ...) {
   va_list arguments;
@@ -96,7 +98,6 @@ static const struct {
 
 static clt_status put_coverage(FILE *page, const char *folder, const cli_calibration *found, clt_error *error) {
   char path[CLT_PATH_MAX];
-  const clt_regions *regions = &found->geometry.regions;
   const long *count = found->geometry.decode.count;
   clt_status status = clt_file_join(folder, "coverage.png", path, error);
   if (status) {
@@ -115,19 +116,25 @@ static clt_status put_coverage(FILE *page, const char *folder, const cli_calibra
             fates[fate].colour, clt_pixel_fate_name((clt_pixel_fate)fate), fates[fate].meaning, count[fate]);
   }
   fputs("</table></div></div>\n", page);
-  if (regions->count > 0) {
-    fputs("<h2>Masked regions</h2>\n<table>\n", page);
+  return status;
+}
+
+static void put_regions(FILE *page, const clt_regions *regions) {
+  if (regions->count == 0) {
+    return;
   }
-  for (int k = 0; k < regions->count; k++) {
+  fputs("<h2>Masked regions</h2>\n<table>\n", page);
+  for (int k = 0; k < regions->count && k < REGIONS_SHOWN; k++) {
     fputs("<tr><td>", page);
     clt_page_text(page, regions->region[k].text);
     fputs("</td></tr>\n", page);
   }
-  if (regions->others > 0) {
-    fprintf(page, "<tr><td class=\"soft\">and %ld smaller regions</td></tr>\n", regions->others);
+  if (regions->count + regions->others > REGIONS_SHOWN) {
+    fprintf(page,
+            "<tr><td class=\"soft\">and %ld smaller ones; <code>summary.json</code> has the larger of them</td></tr>\n",
+            regions->count + regions->others - REGIONS_SHOWN);
   }
-  fputs(regions->count > 0 ? "</table>\n" : "", page);
-  return status;
+  fputs("</table>\n", page);
 }
 
 static void put_geometry(FILE *page, const cli_calibration *found) {
@@ -268,6 +275,7 @@ static clt_status put_page(FILE *page, const char *folder, const cli_calibration
   put_verdict(page, found);
   put_findings(page, &found->findings);
   clt_status status = put_coverage(page, folder, found, error);
+  put_regions(page, &found->geometry.regions);
   put_geometry(page, found);
   put_photometry(page, found);
   put_time(page, &found->whole->report->latency);
