@@ -13,7 +13,7 @@ static const cli_option options[] = {
     {"replay", 0, "DIR", "a recording, a folder of pictures, or a list of them"},
     {"output", 'o', "DIR", "where the results go (default calibration)"},
     {"levels", 0, "N", "of the projector's ramps, 17..65 (default 33)"},
-    {"frames", 0, "N", "averaged for each field, 1..64 (default 6)"},
+    {"frames", 0, "N", "averaged for each field, 2..64 (default 6; noise needs two)"},
     {"watch", 0, "X", "seconds to watch the camera for automatic controls (default 20; 0: not at all)"},
     {"reference", 0, "FILE", "calibration (OpenCV's YAML) to check against"},
     {"panel", 0, "WxH", "pictures: the panel's pixels (default 1280x720)"},
@@ -71,7 +71,7 @@ static clt_status read_measure(const cli_command *command, const cli_arguments *
   const char *watch = cli_value(command, arguments, "watch");
   clt_status status = cli_integer(command, arguments, "levels", 17, 65, &t->options.levels, error);
   if (!status) {
-    status = cli_integer(command, arguments, "frames", 1, 64, &t->options.frames, error);
+    status = cli_integer(command, arguments, "frames", 2, 64, &t->options.frames, error);
   }
   if (!status) {
     status = cli_number(command, arguments, "watch", 0, 600, &t->options.watch_s, error);
