@@ -5,14 +5,19 @@
  * gain as conjugate gradients on the final face do, and they change as much of the active set at once as they like
  * (Schmidt et al., "Optimizing costly functions with simple constraints", AISTATS 2009). Where the model's active set
  * does not settle, or steps have ceased to gain, a spectral projected gradient (Birgin, Martinez & Raydan, SIAM J.
- * Optim. 10, 2000) takes its place. All works on l = F x, in which S is well conditioned at every albedo. */
+ * Optim. 10, 2000) takes its place. Where S is reciprocal a model of S (bounded_reciprocal.c) tells the gradient of
+ * most steps, which then take one product in place of two. All works on l = F x, in which S is well conditioned at
+ * every albedo. */
 #include "solve/bounded.h"
 
 #include <math.h>
 
-static const double TRUSTED = 1e-10; /* of the optimality at x = 0: below this recurrences are recomputed */
-static const double FALLS = 0.9;     /* a step that leaves more than this of the least optimality is stale */
-static const double GAINED = 0.1;    /* of the optimality seen last: where a model says less it is looked up */
+static const double TRUSTED = 1e-10;   /* of the optimality at x = 0: below this recurrences are recomputed */
+static const double FALLS = 0.9;       /* a step that leaves more than this of the least optimality is stale */
+static const double RECIPROCAL = 0.05; /* the reciprocity defect up to which a model of S saves products */
+static const double MISLED = 0.5;  /* of the optimality seen last: more than this shows that the model of S is wrong */
+static const double GAINED = 0.05; /* of the optimality seen last: where a model says less it is looked up */
+static const double CERTAIN = 0.8; /* of the target: what a model must say for it to be reached */
 enum { STALE_STEPS = 4, STALE_STEPS_MAX = 60, BOX_VECTORS = 7, UNSEEN_STEPS = 3 };
 
 /* What is known of S: H = S'S, which says where to go, and S itself where it is reciprocal. */
@@ -170,7 +175,7 @@ static bool find_direction(clt_box *box, clt_models *models, bool model_gains, d
 
 static void open_models(clt_models *models, clt_box *box) {
   clt_system *system = box->system;
-  models->reciprocal = system->square && system->flux != NULL && system->reciprocity <= CLT_RECIPROCAL;
+  models->reciprocal = system->square && system->flux != NULL && system->reciprocity <= RECIPROCAL;
   clt_secants_open(&models->secants, box, BOX_VECTORS);
   if (models->reciprocal) {
     clt_reciprocal_open(&models->transport, box, BOX_VECTORS + CLT_SECANT_VECTORS);
@@ -178,6 +183,13 @@ static void open_models(clt_models *models, clt_box *box) {
     cblas_dscal((blasint)system->cols, -1, box->curved, 1);
     clt_reciprocal_learn_transposed(&models->transport, box->residual, box->curved);
   }
+}
+
+/* Where S is not quite reciprocal the model of S contradicts itself sooner or later: that of H, which does not, starts
+ * over. */
+static void distrust(clt_models *models, const clt_box *box) {
+  models->reciprocal = false;
+  clt_secants_open(&models->secants, box, BOX_VECTORS);
 }
 
 /* After a step: g by the model while that sees more to gain, and by a product with S' where it does not, where it may
@@ -188,7 +200,7 @@ static bool follow(clt_box *box, clt_models *models, bool doubted, double seen) 
   }
   if (models->reciprocal && !doubted && box->unseen < UNSEEN_STEPS) {
     guess(box, models);
-    if (box->optimality > fmax(GAINED * seen, box->target)) {
+    if (box->optimality > fmax(GAINED * seen, CERTAIN * box->target)) {
       return false;
     }
   }
@@ -220,6 +232,9 @@ static clt_outcome run_bounded(clt_system *system, clt_run *run) {
       if (run->tolerance < TRUSTED ? stale > 0 || is_optimal(&box) : looks % CLT_SECANTS == 0) {
         refresh(&box);
       }
+      if (models.reciprocal && box.optimality > MISLED * seen) {
+        distrust(&models, &box);
+      }
       stale = box.optimality < FALLS * least ? 0 : stale + 1;
       seen = box.optimality;
       least = fmin(least, seen);
@@ -231,11 +246,17 @@ static clt_outcome run_bounded(clt_system *system, clt_run *run) {
   return settled ? CLT_RUN_CONVERGED : CLT_RUN_STOPPED;
 }
 
-/* For a target that can be reached: steps of two products that gain as conjugate gradients for the normal equations do.
- * A target that cannot be reached takes the longer, the more cells end at a bound. */
+/* For a target that can be reached. Where S is reciprocal the steps gain as conjugate gradients do, and two in three go
+ * without a product with S'; elsewhere they gain as conjugate gradients for the normal equations do. One that cannot be
+ * reached takes the longer, the more cells end at a bound. */
 static void expect(clt_effort *effort) {
-  clt_effort_normal(effort);
-  clt_effort_take(effort, 1, 2, 4 * CLT_SECANTS);
+  if (effort->channel->reciprocity <= RECIPROCAL) {
+    clt_effort_krylov(effort, true);
+    clt_effort_take(effort, 2, 1.4, 12 * CLT_SECANTS);
+  } else {
+    clt_effort_normal(effort);
+    clt_effort_take(effort, 1, 2, 4 * CLT_SECANTS);
+  }
 }
 
 const clt_method clt_method_bounded = {
