@@ -118,7 +118,7 @@ static void count_products(const test_room *room, double tolerance, long most[5]
 }
 
 /* Fewer than 20 from cold, to the default tolerance and to 1e-6. Noise far out of reach at the same albedo everywhere
- * is the exception: one room in ten takes 20. */
+ * is the exception: it may take 20. */
 static void few_products_suffice_at_albedo_nine_tenths(void **state) {
   (void)state;
   const double tolerances[] = {1e-4, 1e-6};
