@@ -15,7 +15,7 @@
 #include "solve/wavelet_form.h"
 #include "transport/kernels.h"
 
-enum { SKETCH = 32, SKETCH_SEED = 7 };
+enum { SKETCH = 32, SKETCH_SEED = 7, WORTH_SHARING = 8192 /* cells from which threads pay */ };
 static const double CONFIDENCE = 1.64; /* sqrt(32 / 11.98), the .001 quantile of chi^2 with 32 degrees of freedom */
 static const double FORM_SHARE = 0.7, INNER_SHARE = 0.2; /* of the tolerance */
 static const double FINEST = 1e-3;                       /* below, products with T are worth more than coefficients */
@@ -123,6 +123,7 @@ static double bound(void *context, const double *l, double norm) {
     left[of->bucket[i] % SKETCH] += sign_of(of, i) * of->system->wanted[i];
   }
   const clt_plain_kernels *kernels = clt_plain_choose();
+#pragma omp parallel for schedule(static) if (of->cells >= WORTH_SHARING)
   for (size_t k = 0; k < SKETCH; k += CLT_PLAIN_ROWS) {
     const float *row[CLT_PLAIN_ROWS];
     double sum[CLT_PLAIN_ROWS];

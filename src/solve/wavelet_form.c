@@ -14,7 +14,7 @@ enum {
   BUCKETS_PER_OCTAVE = 4,
   LEAST_EXPONENT = -27,
   TILE = 64,              /* rows and columns that a transposition takes up at once */
-  WORTH_SHARING = 1 << 20 /* coefficients from which threads pay */
+  WORTH_SHARING = 1 << 17 /* coefficients from which threads pay */
 };
 
 /* What is needed only while a form is made. */

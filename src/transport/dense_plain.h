@@ -10,7 +10,7 @@
 enum {
   LANES = 8,  /* partial sums of a row, so that additions do not wait for each other */
   PANEL = 64, /* rows that a transposed product takes up at once */
-  TILE = 4096 /* columns of x that it keeps in the nearest caches meanwhile; rows are read in long runs */
+  TILE = 8192 /* columns of x that it keeps in the nearest caches meanwhile; rows are read in long runs */
 };
 
 static const REAL *row_of(const clt_transport *transport, int channel, size_t row) {
