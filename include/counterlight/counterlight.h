@@ -5,14 +5,19 @@
 
 #include "counterlight/acquire.h"
 #include "counterlight/analysis.h"
+#include "counterlight/calibration.h"
 #include "counterlight/device.h"
 #include "counterlight/forward.h"
 #include "counterlight/image.h"
+#include "counterlight/loop.h"
+#include "counterlight/panel.h"
+#include "counterlight/replay.h"
 #include "counterlight/rig.h"
 #include "counterlight/scene.h"
 #include "counterlight/solve.h"
 #include "counterlight/station.h"
 #include "counterlight/status.h"
+#include "counterlight/tradeoff.h"
 #include "counterlight/transport.h"
 
 #endif

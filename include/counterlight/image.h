@@ -28,16 +28,25 @@ CLT_PUBLIC size_t clt_image_size(const clt_image *image);
 
 /* How a code value v in 0..1 (a panel value, a camera sample over full scale, a PNG sample) stands for linear light
  * in 0..1. A response curve of a projector or camera is one of these. */
-typedef enum clt_curve_kind { CLT_CURVE_LINEAR, CLT_CURVE_SRGB, CLT_CURVE_GAMMA } clt_curve_kind;
+typedef enum clt_curve_kind { CLT_CURVE_LINEAR, CLT_CURVE_SRGB, CLT_CURVE_GAMMA, CLT_CURVE_TABLE } clt_curve_kind;
+enum { CLT_CURVE_SAMPLES = 65 };
 typedef struct clt_curve {
   clt_curve_kind kind;
   double gamma; /* CLT_CURVE_GAMMA: light = v^gamma, 0.2..5 */
+  /* CLT_CURVE_TABLE: light at the codes i / 64, from 0 to 1 and never falling; monotone cubics between (Fritsch &
+   * Butland 1984). A curve that was measured. */
+  double table[CLT_CURVE_SAMPLES];
 } clt_curve;
 
 /* Reads "linear", "srgb" or "gamma 2.2" (also "gamma:2.2"). */
 CLT_PUBLIC clt_status clt_curve_parse(const char *text, clt_curve *curve, clt_error *error);
-/* Writes the same text back; size >= 24 holds every curve. */
+/* Writes the same text back, or "table", which names a measured curve without saying it; size >= 24 holds every text.
+ */
 CLT_PUBLIC void clt_curve_format(const clt_curve *curve, char *text, size_t size);
+/* The table through count points (codes[i], light[i]) that begin at (0, 0) and end at (1, 1): codes ascend, light does
+ * not fall (CLT_BAD_INPUT otherwise). */
+CLT_PUBLIC clt_status clt_curve_from_points(const double *codes, const double *light, int count, clt_curve *curve,
+                                            clt_error *error);
 /* Code value to linear light, and back. Both are monotone, map 0 to 0 and 1 to 1, and clip their argument to 0..1. */
 CLT_PUBLIC double clt_curve_decode(const clt_curve *curve, double code);
 CLT_PUBLIC double clt_curve_encode(const clt_curve *curve, double light);

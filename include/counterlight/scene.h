@@ -54,6 +54,18 @@ typedef struct clt_reference {
 CLT_PUBLIC clt_status clt_scene_reference(const clt_scene *scene, const clt_image *drive, int cells, clt_reference *out,
                                           clt_error *error);
 
+/* Radiance of a scene's surface elements where every one of them glows with radiance 1. */
+typedef struct clt_furnace {
+  int elements;           /* of the surfaces that exchange light */
+  double least, greatest; /* radiance of an element */
+} clt_furnace;
+/* The furnace test of how a scene exchanges light: B = 1 + albedo G B, solved exactly in double, with the same albedo
+ * (0 to below 1) on every surface in place of its own. In a closed room B is 1 / (1 - albedo) everywhere, whatever its
+ * shape; where light escapes it is less, and nowhere more. CLT_BAD_INPUT for a scene of a transport file and for one
+ * whose surfaces exchange no light. Meshes the scene anew as a small one is, whatever its grid; at most some seconds.
+ */
+CLT_PUBLIC clt_status clt_scene_furnace(const clt_scene *scene, double albedo, clt_furnace *out, clt_error *error);
+
 enum { CLT_EFFECTS = 22, CLT_EFFECT_WHY_MAX = 160 };
 /* What the simulation does about one effect in one scene. */
 typedef struct clt_effect_report {

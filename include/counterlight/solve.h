@@ -33,8 +33,11 @@ typedef struct clt_channel_certificate {
  * radius_low with R as it stands, whose noise averages out), flux weights w such that S diag(w) is nearest to
  * symmetric, dark cells from F (below 1e-3 of the 90th percentile) and the transport's sigma (below 5 of them). Where
  * rows != cols there is no diagonal: a column's sum stands for F, and radius_high, norm_high and reciprocity are
- * infinite (not known). */
+ * infinite (not known). CLT_BAD_INPUT where a value that takes part is not a number, and where no cell shows its own
+ * light though light goes elsewhere (a mirror, rows out of order; of a T without sigma). */
 CLT_PUBLIC clt_status clt_certify(const clt_transport *transport, clt_certificate **out, clt_error *error);
+/* The `white` of every channel alone (channels values): without the products that the bounds take. */
+CLT_PUBLIC clt_status clt_certify_white(const clt_transport *transport, double *white, clt_error *error);
 CLT_PUBLIC void clt_certificate_destroy(clt_certificate *certificate);
 CLT_PUBLIC const clt_channel_certificate *clt_certificate_channel(const clt_certificate *certificate, int channel);
 /* lit[i] != 0 where cell i of the channel takes part; cols values, owned by the certificate. */
@@ -62,7 +65,7 @@ typedef struct clt_solve_options {
 
 typedef struct clt_solve_result {
   char method[24];        /* the method that gave the answer */
-  char reason[200];       /* why this one, in one sentence */
+  char reason[320];       /* why this one, in one sentence; of auto with what it expected */
   int iterations;         /* the most that any channel took */
   long products;          /* with T or T', the most that any channel took; channels together count as one */
   double residual;        /* ||T x - b|| / ||b|| over lit rows of every channel, of the x that is returned */
@@ -82,6 +85,26 @@ CLT_PUBLIC const char *clt_method_summary(size_t index);
  * targets.
  */
 CLT_PUBLIC bool clt_method_invests(size_t index);
+
+/* What a method is expected to take, before it runs: told by the certificate, which tried S on a random picture (16
+ * products with T a channel) and timed that. Pictures differ, and so does a machine from one minute to the next. Expect
+ * the iterations of series, jacobi, damped, chebyshev, pcg, deflated-pcg and gmres within one or half as many again,
+ * those of the others mostly within a factor of two, at worst of six (docs/solving.md). */
+typedef struct clt_forecast {
+  bool possible;
+  char why_not[CLT_MESSAGE_MAX]; /* where it is not possible: the reason */
+  int iterations;                /* the most of any channel; < 0: not known (rows != cols) */
+  double residual;        /* ||T x - b|| / ||b|| then: the tolerance, or more where limit or deadline come first */
+  double seconds;         /* of a solve, every channel; < 0: not known */
+  double prepare_seconds; /* before the first solve */
+} clt_forecast;
+
+/* Foretells a solve of the method, tolerance, limit and deadline of `options` (NULL and "auto": what auto would take).
+ * A method that the certificate refuses is no failure: `possible` is false then. CLT_BAD_INPUT for options out of range
+ * and a method that does not exist. "bounded" is foretold for a target that can be reached; one that cannot be takes up
+ * to several times as long. */
+CLT_PUBLIC clt_status clt_forecast_solve(const clt_transport *transport, const clt_certificate *certificate,
+                                         const clt_solve_options *options, clt_forecast *out, clt_error *error);
 
 /* A method made ready for one transport: its workspace, and what it keeps from solve to solve (a factor, a stored
  * inverse). One solve at a time. */

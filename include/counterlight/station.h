@@ -22,7 +22,7 @@ typedef struct clt_station_config {
    * the scene when the rig is opened. */
   clt_rig_config rig;
   bool projector_response_given, camera_response_given; /* rig.projector, rig.camera come from the file */
-  char scheme[24];                                      /* of the acquisition: "auto", "brute", "hierarchical" */
+  char scheme[24];                                      /* of the acquisition: "auto", "brute", "hadamard", "hierarchical", "blocks" */
   clt_acquire_options acquire;                          /* scheme, progress and context are left to the caller */
 } clt_station_config;
 

@@ -25,6 +25,7 @@ enum { CLT_GRID_SIDE_MAX = 16384, CLT_CHANNELS_MAX = 4, CLT_TEXT_MAX = 128 };
 /* Where a transport comes from; all fields are optional and travel in the file's root attributes. */
 typedef struct clt_provenance {
   char scheme[CLT_TEXT_MAX];   /* how it was acquired: "brute", "hierarchical", ...; empty: not known */
+  char plan[CLT_TEXT_MAX];     /* which scheme was taken and why, in one sentence */
   char source[CLT_TEXT_MAX];   /* the rig or scene it was measured on */
   char response[CLT_TEXT_MAX]; /* the projector's response curve, as clt_curve_parse reads it; empty: sRGB */
   int64_t acquired;            /* seconds since 1970-01-01 UTC; 0: not known */
@@ -37,7 +38,7 @@ typedef struct clt_provenance {
 typedef struct clt_transport_info {
   int width, height, channels;
   size_t rows, cols;   /* cols = width * height; rows = cols where one camera shares the projector's grid */
-  const char *storage; /* "dense", "dense64", "dense16", "dense8", "tree" */
+  const char *storage; /* "dense", "dense64", "dense16", "dense8", "tree", "blocks" */
   size_t bytes;        /* memory that one product of every channel reads */
 } clt_transport_info;
 
@@ -61,6 +62,26 @@ CLT_PUBLIC int clt_tree_levels(int width, int height);
 /* Number of the node at column bx, row by of level `level`, and the total of nodes. */
 CLT_PUBLIC int32_t clt_tree_node(int width, int height, int level, int bx, int by);
 CLT_PUBLIC int32_t clt_tree_nodes(int width, int height);
+
+/* The parts of a transport in "blocks" storage, for N cells and as many rows: T = near + far. Blocks share out the
+ * drive cells; far is given by the light that each whole block sends to every cell, and by reciprocity. With w the flux
+ * of a cell, D_b that of a block, cell i in block a and j in b, far_ij = w_j [C_ib / D_b + (C_ja - mean of C_a over b
+ * by flux) / D_a], so that a block fully driven gives its column C_b exactly, and one with flux 0 nothing. */
+typedef struct clt_block_parts {
+  int count;            /* K blocks, 1..N */
+  const int32_t *block; /* N: 0..K-1, the block of each cell */
+  const float *flux;    /* N: w, >= 0; what light a cell sends into the room, in any unit */
+  const float *column;  /* channels x K x N: C */
+  /* near, by compressed rows with the same pattern in every channel: row i has the entries start[i] .. start[i + 1] - 1
+   * of cell (their columns) and of value, which holds channel after channel */
+  const int64_t *start;
+  const int32_t *cell;
+  const float *value;
+} clt_block_parts;
+/* Makes a transport of them, which are copied. CLT_BAD_INPUT where an index is out of range, a value not finite or a
+ * flux negative. */
+CLT_PUBLIC clt_status clt_transport_create_blocks(int width, int height, int channels, const clt_block_parts *parts,
+                                                  clt_transport **out, clt_error *error);
 
 /* Makes a copy in another dense storage, from any storage: entries, black, flood, deviations and provenance. Errors are
  * relative to the largest entry off the diagonal of a row (max_i) or of 32 neighbours in it (max_b); "rms" is what they

@@ -6,18 +6,16 @@
 #include <string.h>
 #include <time.h>
 
+#include "acquire/choose.h"
 #include "acquire/session.h"
 #include "base/clock.h"
 #include "base/memory.h"
 
 #define THRESHOLD_DEFAULT 0.005
 #define THRESHOLD_MAX 0.5
+#define ERROR_DEFAULT 0.005
+#define ERROR_MAX 0.5
 enum { CHECKS_MAX = 64 };
-/* Up to here one photograph per cell is as quick as anything cleverer. */
-enum { BRUTE_CELLS_MAX = 64 };
-
-static const clt_scheme *const schemes[] = {&clt_scheme_brute, &clt_scheme_hierarchical};
-enum { SCHEMES = sizeof schemes / sizeof schemes[0] };
 
 static clt_status check_options(const clt_acquire_options *options, clt_acquire_options *checked, clt_error *error) {
   *checked = *options;
@@ -31,25 +29,16 @@ static clt_status check_options(const clt_acquire_options *options, clt_acquire_
   if (options->checks < 0 || options->checks > CHECKS_MAX) {
     return clt_fail(error, CLT_BAD_INPUT, "checks is %d; legal is 0 to %d", options->checks, CHECKS_MAX);
   }
+  if (!(options->error >= 0 && options->error <= ERROR_MAX) || !(options->seconds >= 0)) {
+    return clt_fail(
+        error, CLT_BAD_INPUT,
+        "the wanted error is %g, the seconds allowed are %g; legal is 0 (the default) to %g, and 0 (no limit) "
+        "or more",
+        options->error, options->seconds, ERROR_MAX);
+  }
+  checked->error = options->error > 0 ? options->error : ERROR_DEFAULT;
   checked->threshold = options->threshold > 0 ? options->threshold : THRESHOLD_DEFAULT;
   return CLT_OK;
-}
-
-static clt_status find_scheme(const char *name, size_t cells, const clt_scheme **out, clt_error *error) {
-  if (name == NULL || strcmp(name, "auto") == 0) {
-    *out = cells <= BRUTE_CELLS_MAX ? &clt_scheme_brute : &clt_scheme_hierarchical;
-    return CLT_OK;
-  }
-  char names[96] = "auto";
-  for (size_t i = 0; i < SCHEMES; i++) {
-    if (strcmp(schemes[i]->name, name) == 0) {
-      *out = schemes[i];
-      return CLT_OK;
-    }
-    size_t used = strlen(names);
-    snprintf(names + used, sizeof names - used, ", %s", schemes[i]->name);
-  }
-  return clt_fail(error, CLT_BAD_INPUT, "\"%.40s\" is no acquisition scheme; there are %s", name, names);
 }
 
 static clt_status measure_black_and_flood(clt_session *session, clt_error *error) {
@@ -78,61 +67,6 @@ static clt_status write_black_and_flood(const clt_session *session, clt_transpor
   return status;
 }
 
-/* Every value of the drive 0 or 1 by a hash of its number, so that no panel rounds it. */
-static void draw_check(clt_session *session, unsigned check) {
-  size_t values = clt_image_size(&session->drive);
-  uint64_t state = ((uint64_t)session->options.seed << 32) + check;
-  for (size_t i = 0; i < values; i++) {
-    /* splitmix64: Steele, Lea, Flood 2014 */
-    uint64_t z = (state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    session->drive.data[i] = (float)(z >> 63);
-  }
-}
-
-/* Adds ||b0 + T x - y||^2, less what the noise of y adds to it, and ||y||^2 of the last observation; x and y are
- * workspace of `cells` values each. */
-static void add_check_error(const clt_session *session, const clt_transport *transport, double *x, double *y,
-                            double *wrong, double *seen) {
-  size_t cells = session->cells;
-  for (int c = 0; c < session->info.channels; c++) {
-    size_t first = (size_t)c * cells;
-    for (size_t j = 0; j < cells; j++) {
-      x[j] = session->drive.data[first + j];
-    }
-    clt_transport_apply(transport, c, x, y);
-    for (size_t i = 0; i < cells; i++) {
-      double deviation = session->deviation.data[first + i];
-      if (isfinite(deviation)) {
-        double observed = session->seen.data[first + i], predicted = y[i] + session->black.data[first + i];
-        *wrong += (predicted - observed) * (predicted - observed) - deviation * deviation;
-        *seen += observed * observed;
-      }
-    }
-  }
-}
-
-static clt_status measure_error(clt_session *session, const clt_transport *transport, double *relative,
-                                clt_error *error) {
-  double wrong = 0, seen = 0;
-  double *x = clt_alloc(2 * session->cells, sizeof *x);
-  if (x == NULL) {
-    return clt_fail(error, CLT_FAILED, "out of memory for check patterns of %zu cells", session->cells);
-  }
-  clt_status status = CLT_OK;
-  for (int k = 0; status == CLT_OK && k < session->options.checks; k++) {
-    draw_check(session, (unsigned)k);
-    status = clt_session_observe(session, "check", error);
-    if (status == CLT_OK) {
-      add_check_error(session, transport, x, x + session->cells, &wrong, &seen);
-    }
-  }
-  free(x);
-  *relative = seen > 0 ? sqrt(fmax(wrong, 0) / seen) : -1;
-  return status;
-}
-
 static void write_provenance(const clt_session *session, const clt_scheme *scheme, double error,
                              clt_transport *transport) {
   clt_rig_info now;
@@ -143,6 +77,7 @@ static void write_provenance(const clt_session *session, const clt_scheme *schem
                              .frames = (int)(now.frames - session->info.frames),
                              .seconds = clt_clock_since(session->started_ns),
                              .error = error};
+  snprintf(origin->plan, sizeof origin->plan, "%s", session->plan);
   snprintf(origin->scheme, sizeof origin->scheme, "%s", scheme->name);
   snprintf(origin->source, sizeof origin->source, "%s", now.source != NULL ? now.source : "");
   snprintf(origin->response, sizeof origin->response, "%s", now.response != NULL ? now.response : "");
@@ -150,7 +85,8 @@ static void write_provenance(const clt_session *session, const clt_scheme *schem
 
 static clt_status acquire(clt_session *session, const clt_scheme *scheme, clt_transport **out, clt_error *error) {
   const clt_acquire_options *options = &session->options;
-  session->progress.total = 2L * options->repeats + scheme->patterns(session) + options->checks;
+  session->progress.total =
+      session->progress.done + 2L * options->repeats + scheme->patterns(session) + options->checks;
   clt_transport *transport = NULL;
   double relative = -1;
   clt_status status = measure_black_and_flood(session, error);
@@ -162,7 +98,7 @@ static clt_status acquire(clt_session *session, const clt_scheme *scheme, clt_tr
   }
   if (status == CLT_OK) {
     session->progress.total = session->progress.done + options->checks;
-    status = measure_error(session, transport, &relative, error);
+    status = clt_session_check(session, transport, &relative, error);
   }
   if (status != CLT_OK) {
     clt_transport_destroy(transport);
@@ -183,7 +119,7 @@ clt_status clt_acquire(clt_rig *rig, const clt_acquire_options *options, clt_tra
   const clt_scheme *scheme = NULL;
   status = clt_session_init(&session, rig, &checked, error);
   if (status == CLT_OK) {
-    status = find_scheme(checked.scheme, session.cells, &scheme, error);
+    status = clt_choose_scheme(&session, &scheme, error);
   }
   if (status == CLT_OK) {
     session.options.repeats = checked.repeats > 0 ? checked.repeats : scheme->repeats(session.cells);

@@ -120,4 +120,9 @@ static clt_status measure_brute(clt_session *session, clt_transport **out, clt_e
   return CLT_OK;
 }
 
-const clt_scheme clt_scheme_brute = {"brute", repeats_of_black, count_columns, measure_brute};
+static double expected_error(const clt_session *session) {
+  (void)session;
+  return 0.003;
+}
+
+const clt_scheme clt_scheme_brute = {"brute", repeats_of_black, count_columns, expected_error, false, measure_brute};

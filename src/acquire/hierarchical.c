@@ -27,7 +27,7 @@ typedef struct hierarchy {
   clt_session *session;
   clt_pyramid pyramid;
   double scale[CLT_CHANNELS_MAX]; /* light of one lit cell fully flooded, per channel: the unit of the row trees */
-  double threshold;               /* tau, in that unit */
+  double threshold;               /* tau, in that unit, or the noise where that is more */
   clt_row_trees trees;
   int32_t *colour; /* of each block of the level, -1: not lit */
   int32_t colours;
@@ -95,6 +95,19 @@ static void subtract_black(hierarchy *tree) {
         session->deviation.data[at] * session->deviation.data[at] + session->black_variance.data[at];
   }
   scale_variance(tree, &session->deviation, tree->noise);
+}
+
+/* A split tells a row nothing where what it may find is below the noise of a photograph: the rms of the last one's,
+ * over the rows that were seen, is the least threshold of the next level. */
+static void respect_noise(hierarchy *tree) {
+  double sum = 0, count = 0;
+  for (size_t i = 0; i < tree->session->cells; i++) {
+    if (isfinite(tree->noise[i])) {
+      sum += (double)tree->noise[i];
+      count += 1;
+    }
+  }
+  tree->threshold = fmax(tree->session->options.threshold, count > 0 ? sqrt(sum / count) : 0);
 }
 
 static void light_block(const hierarchy *tree, int level, int32_t node) {
@@ -181,6 +194,7 @@ static clt_status refine_level(hierarchy *tree, int level, clt_error *error) {
     clt_row_trees_finish(&split);
     return status;
   }
+  respect_noise(tree);
   clt_row_trees_settle(&split, &tree->trees, &tree->pyramid, level);
   clt_row_trees_finish(&tree->trees);
   tree->trees = split;
@@ -321,4 +335,10 @@ static long guess_patterns(const clt_session *session) {
   return 40L * (pyramid.levels - 1);
 }
 
-const clt_scheme clt_scheme_hierarchical = {"hierarchical", repeats_by_default, guess_patterns, measure_hierarchical};
+/* In proportion to tau over a floor of noise (docs/configuration.md). */
+static double expected_error(const clt_session *session) {
+  return 0.002 + 0.3 * session->options.threshold;
+}
+
+const clt_scheme clt_scheme_hierarchical = {"hierarchical", repeats_by_default,  guess_patterns, expected_error,
+                                            false,          measure_hierarchical};

@@ -15,10 +15,11 @@ clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquir
   for (size_t i = 0; status == CLT_OK && i < sizeof images / sizeof images[0]; i++) {
     status = clt_image_init(images[i], info->channels, info->height, info->width, error);
   }
-  return status;
+  return status == CLT_OK ? clt_journal_open(&session->journal, options->journal, info, error) : status;
 }
 
 void clt_session_finish(clt_session *session) {
+  clt_journal_close(&session->journal);
   clt_image_finish(&session->drive);
   clt_image_finish(&session->seen);
   clt_image_finish(&session->deviation);
@@ -35,10 +36,22 @@ void clt_session_fill(clt_session *session, float value) {
   }
 }
 
+/* From the journal, or from the rig and into the journal. */
+static clt_status observe(clt_session *session, clt_error *error) {
+  clt_image *drive = &session->drive, *seen = &session->seen, *deviation = &session->deviation;
+  bool found = false;
+  clt_status status = clt_journal_replay(&session->journal, drive, seen, deviation, &found, error);
+  if (status != CLT_OK || found) {
+    session->progress.resumed += found;
+    return status;
+  }
+  status = session->rig->operations->observe(session->rig, drive, seen, deviation, error);
+  return status == CLT_OK ? clt_journal_add(&session->journal, drive, seen, deviation, error) : status;
+}
+
 clt_status clt_session_observe(clt_session *session, const char *phase, clt_error *error) {
   clt_progress *progress = &session->progress;
-  clt_status status =
-      session->rig->operations->observe(session->rig, &session->drive, &session->seen, &session->deviation, error);
+  clt_status status = observe(session, error);
   if (status != CLT_OK) {
     return clt_fail_within(error, "acquiring (%s, pattern %ld): ", phase, progress->done + 1);
   }
@@ -80,4 +93,10 @@ clt_status clt_session_average(clt_session *session, const char *phase, clt_imag
     variance->data[i] = count > 0 ? deviation * deviation / count : INFINITY;
   }
   return CLT_OK;
+}
+
+bool clt_session_may_go_on(const clt_session *session) {
+  const clt_progress *progress = &session->progress;
+  const double allowed = session->options.seconds, each = progress->seconds / (double)progress->done;
+  return !(allowed > 0) || progress->seconds + (1 + session->options.checks) * each <= allowed;
 }

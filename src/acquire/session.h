@@ -2,6 +2,7 @@
 #ifndef CLT_ACQUIRE_SESSION_H
 #define CLT_ACQUIRE_SESSION_H
 
+#include "acquire/journal.h"
 #include "counterlight/acquire.h"
 
 typedef struct clt_session {
@@ -14,6 +15,8 @@ typedef struct clt_session {
   clt_image black, black_variance; /* the mean of the repeats and the variance of that mean */
   clt_image flood, flood_variance; /* likewise, the black subtracted; an infinite variance: not seen in any repeat */
   clt_progress progress;
+  clt_journal journal;
+  char plan[CLT_TEXT_MAX]; /* the scheme, and why this one */
   int64_t started_ns;
 } clt_session;
 
@@ -22,11 +25,13 @@ typedef struct clt_scheme {
   const char *name;
   int (*repeats)(size_t cells);                 /* of black and flood where the options leave it open */
   long (*patterns)(const clt_session *session); /* expected number, without black, flood and checks */
+  double (*error)(const clt_session *session);  /* expected relative RMS of an appearance */
+  bool stops;                                   /* where the seconds allowed are over, with what it has */
   /* Measures a transport with black and flood already in the session; rows sum to the flood; sigma is kept. */
   clt_status (*measure)(clt_session *session, clt_transport **out, clt_error *error);
 } clt_scheme;
 enum { CLT_REPEATS_DEFAULT = 8, CLT_REPEATS_MAX = 256 };
-extern const clt_scheme clt_scheme_brute, clt_scheme_hierarchical;
+extern const clt_scheme clt_scheme_brute, clt_scheme_hadamard, clt_scheme_hierarchical, clt_scheme_blocks;
 
 clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquire_options *options, clt_error *error);
 void clt_session_finish(clt_session *session); /* accepts a half-built one */
@@ -40,5 +45,13 @@ clt_status clt_session_observe(clt_session *session, const char *phase, clt_erro
  * (infinite where none was valid; the mean is then the last bound seen). */
 clt_status clt_session_average(clt_session *session, const char *phase, clt_image *mean, clt_image *variance,
                                clt_error *error);
+
+/* False where another pattern would probably end after the seconds allowed. */
+bool clt_session_may_go_on(const clt_session *session);
+/* ||b0 + T x - y|| / ||y|| of the last observation y of the drive x, less what its noise adds. */
+clt_status clt_session_miss(const clt_session *session, const clt_transport *transport, double *relative,
+                            clt_error *error);
+/* Observes options.checks random pictures: the same of all together, < 0 where there is none. */
+clt_status clt_session_check(clt_session *session, const clt_transport *transport, double *relative, clt_error *error);
 
 #endif

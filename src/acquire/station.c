@@ -92,7 +92,10 @@ static clt_rig_config complete_rig(const clt_station_config *config, const clt_s
   rig.latency_s = rig.latency_s < 0 ? measured.latency_s : rig.latency_s;
   rig.timeout_s = rig.timeout_s > 0 ? rig.timeout_s : measured.timeout_s;
   rig.attempts = rig.attempts > 0 ? rig.attempts : measured.attempts;
-  rig.projector = config->projector_response_given ? rig.projector : measured.projector;
+  for (int c = 0; c < CLT_PANEL_CHANNELS && config->projector_response_given; c++) {
+    measured.projector.response[c] = rig.projector.response[c];
+  }
+  rig.projector = measured.projector;
   rig.camera = config->camera_response_given ? rig.camera : measured.camera;
   memcpy(rig.source, measured.source, sizeof rig.source);
   return rig;

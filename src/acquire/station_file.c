@@ -8,7 +8,7 @@
 #include "counterlight/transport.h"
 #include "rig/merge.h"
 
-static const char *const scheme_names[] = {"auto", "brute", "hierarchical", NULL};
+static const char *const scheme_names[] = {"auto", "brute", "hadamard", "hierarchical", "blocks", NULL};
 #define SIMULATED "simulated"
 #define MS 1e-3
 
@@ -57,6 +57,8 @@ static void read_acquire(clt_section section, clt_station_config *config) {
   clt_acquire_options *acquire = &config->acquire;
   copy_text(config->scheme, sizeof config->scheme, scheme_names[clt_read_choice(section, "scheme", 0, scheme_names)]);
   acquire->threshold = clt_read_number(section, "threshold", 0, 0, 0.5);
+  acquire->error = clt_read_number(section, "error", 0, 0, 0.5);
+  acquire->seconds = clt_read_number(section, "seconds", 0, 0, 1e9);
   acquire->repeats = clt_read_integer(section, "repeats", 0, 1, 256);
   acquire->checks = clt_read_integer(section, "checks", 2, 0, 64);
   acquire->seed = (unsigned)clt_read_integer(section, "seed", 0, 0, 1000000000);
@@ -81,8 +83,10 @@ clt_status clt_station_read(const char *path, clt_station_config *config, clt_er
   set_defaults(config);
   clt_section root = clt_settings_root(settings);
   status = read_scene(root, path, config, error);
-  read_device(clt_section_group(root, "projector"), config->projector, sizeof config->projector, &config->rig.projector,
+  clt_curve panel = {.kind = CLT_CURVE_LINEAR};
+  read_device(clt_section_group(root, "projector"), config->projector, sizeof config->projector, &panel,
               &config->projector_response_given);
+  config->rig.projector = clt_panel_of_curve(&panel);
   read_device(clt_section_group(root, "camera"), config->camera, sizeof config->camera, &config->rig.camera,
               &config->camera_response_given);
   read_rig(clt_section_group(root, "rig"), &config->rig);

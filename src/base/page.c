@@ -35,7 +35,7 @@ static const char style[] =
     ".r0{--run:#7c8798}.r1{--run:#2a9d8f}.r2{--run:#3b82f6}.r3{--run:#a855f7}"
     ".r4{--run:#d4a017}.r5{--run:var(--mark)}"
     ".r4 polyline{stroke-dasharray:7 5}\n"
-    ".scale{max-width:700px;margin:16px auto 0}.curve{max-width:860px}\n"
+    ".wide{overflow-x:auto}.scale{max-width:700px;margin:16px auto 0}.curve{max-width:860px}\n"
     "dl{margin:0;max-width:52em}dt{font-weight:600;margin-top:.9em}dd{margin:0;color:var(--soft)}\n"
     "</style></head><body><main>\n";
 

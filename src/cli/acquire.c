@@ -1,4 +1,6 @@
 /* counterlight acquire: measures the light transport and stores it. */
+#include <unistd.h>
+
 #include "cli/answer.h"
 #include "cli/command.h"
 #include "cli/measure.h"
@@ -8,15 +10,20 @@ static const cli_option options[] = {
     {"config", 'c', "C", "configuration that names the devices"},
     {"scene", 's', "S", "scene file: measure with simulated devices"},
     {"output", 'o', "T.h5", "where the transport goes"},
-    {"scheme", 0, "NAME", "auto, brute (a cell at a time) or hierarchical"},
+    {"scheme", 0, "NAME", "auto, brute (a cell at a time), hadamard, hierarchical or blocks"},
+    {"error", 0, "X", "wanted appearance error: blocks stops there, auto chooses by it (0..0.5)"},
+    {"seconds", 0, "X", "time allowed: blocks stops there, auto chooses by it"},
+    {"resume", 0, "FILE", "keep every observation there, and begin with those it holds"},
     {"threshold", 0, "X", "hierarchical: fraction of a cell's light left unresolved (0..0.5)"},
     {"repeats", 0, "N", "observations averaged for black and flood (1..256)"},
     {NULL, 0, NULL, NULL},
 };
 
-static const char notes[] = "Ctrl-C ends it with nothing written.\n"
-                            "The check error is the relative RMS between random patterns as observed and as\n"
-                            "the stored transport predicts them.\n";
+static const char notes[] =
+    "Ctrl-C ends it with nothing written but the file of --resume: the same command then goes on from there, also\n"
+    "after a crash. The file is removed when the transport is stored.\n"
+    "The check error is the relative RMS between random patterns as observed and as\n"
+    "the stored transport predicts them.\n";
 
 typedef struct task {
   const char *output;
@@ -51,17 +58,23 @@ static clt_status measure(task *t, clt_error *error) {
   if (!status) {
     status = cli_measure(&t->config, &t->station, &t->progress, &t->transport, error);
   }
-  return status ? status : clt_transport_save(t->transport, t->output, error);
+  if (!status) {
+    status = clt_transport_save(t->transport, t->output, error);
+  }
+  if (!status && t->config.acquire.journal != NULL) {
+    unlink(t->config.acquire.journal);
+  }
+  return status;
 }
 
 static int answer(const cli_arguments *arguments, const task *t) {
   clt_transport_info info = clt_transport_describe(t->transport);
   const clt_provenance *origin = clt_transport_origin(t->transport);
   if (arguments->json) {
-    return cli_print_json(json_pack("{s:s, s:o, s:s, s:I, s:s, s:i, s:i, s:o, s:o}", "output", t->output, "grid",
+    return cli_print_json(json_pack("{s:s, s:o, s:s, s:I, s:s, s:s, s:i, s:i, s:o, s:o}", "output", t->output, "grid",
                                     cli_json_grid(&(cli_grid){info.width, info.height, info.channels}), "storage",
-                                    info.storage, "bytes", (json_int_t)info.bytes, "scheme", origin->scheme, "patterns",
-                                    origin->patterns, "frames", origin->frames, "acquire_s",
+                                    info.storage, "bytes", (json_int_t)info.bytes, "scheme", origin->scheme, "plan",
+                                    origin->plan, "patterns", origin->patterns, "frames", origin->frames, "acquire_s",
                                     cli_json_number(origin->seconds), "error",
                                     origin->error < 0 ? json_null() : cli_json_number(origin->error)));
   }

@@ -44,6 +44,7 @@ static void add_text(json_t *object, const char *key, const char *text) {
 json_t *cli_json_provenance(const clt_provenance *origin) {
   json_t *object = json_object();
   add_text(object, "scheme", origin->scheme);
+  add_text(object, "plan", origin->plan);
   add_text(object, "source", origin->source);
   add_text(object, "response", origin->response);
   if (origin->acquired > 0) {

@@ -1,6 +1,7 @@
 /* counterlight compensate: the drive that makes a picture appear. */
 #include "cli/answer.h"
 #include "cli/command.h"
+#include "cli/optical.h"
 #include "cli/solve_options.h"
 #include "cli/transport_input.h"
 
@@ -12,6 +13,9 @@ static const cli_option options[] = {
     {"deadline-ms", 0, "X", "stop after this time with the best drive so far"},
     {"white", 'w', "W", "radiance of the picture's white: a number, auto or feasible"},
     {"predict", 'p', "SEEN", "also write what the drive will look like"},
+    {"config", 'c', "C", "no transport: solve through the rig that this configuration names"},
+    {"scene", 's', "S", "no transport: solve through simulated devices in this scene"},
+    {"photographs", 0, "N", "through a rig: at most so many (4..1000, default 40)"},
     {NULL, 0, NULL, NULL},
 };
 
@@ -23,6 +27,8 @@ static const char notes[] =
     "(sRGB where it names none); .exr and .npy hold linear light.\n"
     "--predict writes b0 + T x: divided by white and sRGB-encoded as .png or .jpg, so that it compares\n"
     "with the picture by eye; the radiance itself as .exr or .npy.\n"
+    "With --config or --scene there is no transport: the room itself makes the products, a photograph each, and\n"
+    "--tolerance (default 5e-3) counts over the cells that can follow. Errors are then as photographed.\n"
     "Errors are relative RMS over the lit cells in linear light; error_after is that of the drive as written\n"
     "(a .png rounds it to 8 bits), error_limit the least that any drive in 0..1 can reach.\n";
 
@@ -116,11 +122,17 @@ static int answer(const cli_arguments *arguments, const task *t) {
 }
 
 static int run(const cli_command *command, const cli_arguments *arguments) {
+  if (cli_value(command, arguments, "config") != NULL || cli_value(command, arguments, "scene") != NULL) {
+    return cli_compensate_optically(command, arguments);
+  }
   task t = {0};
   clt_error error = {0};
   clt_status status = read_options(command, arguments, &t, &error);
   if (!status) {
-    status = solve(arguments->positional[0], &t, &error);
+    status = arguments->positional_count > 0
+                 ? solve(arguments->positional[0], &t, &error)
+                 : clt_fail(&error, CLT_BAD_INPUT, "give a transport file, --config or --scene; usage: counterlight %s",
+                            command->synopsis);
   }
   if (!status) {
     status = write_pictures(&t, &error);
@@ -132,10 +144,9 @@ static int run(const cli_command *command, const cli_arguments *arguments) {
 
 const cli_command cli_command_compensate = {
     .name = "compensate",
-    .synopsis = "T.h5 --target PIC -o OUT [options]",
+    .synopsis = "T.h5 | --config C | --scene S, --target PIC -o OUT [options]",
     .summary = "compute the drive that makes a picture appear",
     .options = options,
-    .positional_least = 1,
     .positional_most = 1,
     .run = run,
     .notes = notes,

@@ -15,7 +15,7 @@ static const cli_option options[] = {
     {"target", 't', "PIC", "the picture to make appear (default: one that is drawn)"},
     {"output", 'o', "DIR", "folder of the results (default: demo-out)"},
     {"white", 'w', "W", "radiance of the picture's white: a number, auto or feasible"},
-    {"scheme", 0, "NAME", "of the acquisition: auto, brute or hierarchical"},
+    {"scheme", 0, "NAME", "of the acquisition: auto, brute, hadamard, hierarchical or blocks"},
     {NULL, 0, NULL, NULL},
 };
 

@@ -8,12 +8,20 @@ clt_status cli_measure_options(const cli_command *command, const cli_arguments *
   const char *scheme = cli_value(command, arguments, "scheme");
   if (scheme) {
     if (strlen(scheme) >= sizeof config->scheme) {
-      return clt_fail(error, CLT_BAD_INPUT, "--scheme: there is no scheme '%.40s'; take auto, brute or hierarchical",
+      return clt_fail(error, CLT_BAD_INPUT,
+                      "--scheme: there is no scheme '%.40s'; take auto, brute, hadamard, hierarchical or blocks",
                       scheme);
     }
     strcpy(config->scheme, scheme);
   }
   clt_status status = cli_number(command, arguments, "threshold", 0, 0.5, &config->acquire.threshold, error);
+  if (!status) {
+    status = cli_number(command, arguments, "error", 0, 0.5, &config->acquire.error, error);
+  }
+  if (!status) {
+    status = cli_number(command, arguments, "seconds", 0, 1e9, &config->acquire.seconds, error);
+  }
+  config->acquire.journal = cli_value(command, arguments, "resume");
   return status ? status : cli_integer(command, arguments, "repeats", 1, 256, &config->acquire.repeats, error);
 }
 

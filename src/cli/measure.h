@@ -7,7 +7,8 @@
 #include "counterlight/station.h"
 #include "counterlight/transport.h"
 
-/* Changes config by the command's --scheme --threshold --repeats (those that it has and that were given). */
+/* Changes config by the command's --scheme --threshold --error --seconds --resume --repeats (those that it has and that
+ * were given). */
 clt_status cli_measure_options(const cli_command *command, const cli_arguments *arguments, clt_station_config *config,
                                clt_error *error);
 /* Measures T through the station's rig as config says, drawing progress. *out is the caller's. CLT_CANCELLED where

@@ -49,7 +49,11 @@ typedef struct task {
 static bool show_progress(void *context, long done, long total) {
   task *t = context;
   double seconds = clt_clock_since(t->start_ns);
-  clt_progress state = {"squares", done, total, seconds, seconds / (double)done * (double)(total - done)};
+  clt_progress state = {.phase = "squares",
+                        .done = done,
+                        .total = total,
+                        .seconds = seconds,
+                        .left = seconds / (double)done * (double)(total - done)};
   return cli_progress_acquire(&t->progress, &state);
 }
 

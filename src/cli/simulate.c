@@ -5,7 +5,8 @@
 #include "cli/answer.h"
 #include "cli/command.h"
 #include "cli/photograph.h"
-#include "cli/transport_input.h"
+#include "cli/picture.h"
+#include "counterlight/solve.h"
 #include "counterlight/station.h"
 
 static const cli_option options[] = {
@@ -14,6 +15,7 @@ static const cli_option options[] = {
     {"exact", 0, NULL, "the scene's noise-free radiance, without a camera"},
     {"map", 0, "MAP", "where the camera's true pixel map goes (.npy), of a camera with pixels of its own"},
     {"reference", 0, "N", "compare the light of N cells with exactly computed rows, and say how far it is off"},
+    {"furnace", 0, "M", "let all surfaces glow and reflect M, and say how bright that makes them"},
     {NULL, 0, NULL, NULL},
 };
 
@@ -26,6 +28,7 @@ static const char notes[] =
     "--exact takes b0 + T x from the scene instead. --reference N says how far the simulated light is from the exact\n"
     "one at N cells spread over the grid: at most 6400 cells by rows of T in double, above by gathering the light of\n"
     "every surface element by its form factor.\n"
+    "--furnace M lets every surface glow with radiance 1 and reflect M: in a closed room all are 1/(1-M) bright.\n"
     "A .png or .jpg drive holds panel values and is decoded by the scene's projector response; .exr and .npy hold\n"
     "linear light in 0..1. A .png result is divided by the scene's white (the median direct light of a fully driven\n"
     "cell) and sRGB-encoded; .exr and .npy hold the radiance.\n";
@@ -35,6 +38,8 @@ typedef struct task {
   bool exact;
   int reference_cells; /* 0: none */
   clt_reference reference;
+  double furnace_albedo; /* < 0: none */
+  clt_furnace furnace;
   clt_station_config config;
   clt_station station;
   clt_rig_config rig;
@@ -61,6 +66,10 @@ static clt_status read_options(const cli_command *command, const cli_arguments *
                  : clt_fail(error, CLT_BAD_INPUT, "--map %s: a map holds what is no picture; end its name in .npy",
                             t->map_path);
   }
+  t->furnace_albedo = -1.0;
+  if (!status) {
+    status = cli_number(command, arguments, "furnace", 0.0, 0.9999, &t->furnace_albedo, error);
+  }
   return status ? status : cli_picture_output_check(t->output, error);
 }
 
@@ -72,7 +81,6 @@ static clt_status open_scene(const char *path, task *t, clt_error *error) {
   if (status) {
     return status;
   }
-  clt_certificate *certificate = NULL;
   const clt_transport *transport = clt_scene_transport(t->station.scene);
   clt_transport_info info = clt_transport_describe(transport);
   t->grid = (cli_grid){info.width, info.height, info.channels};
@@ -80,11 +88,10 @@ static clt_status open_scene(const char *path, task *t, clt_error *error) {
   clt_camera_info sensor;
   t->station.camera->driver->describe(t->station.camera, &sensor);
   t->own_pixels = sensor.own_pixels;
-  status = clt_certify(transport, &certificate, error);
-  if (!status) {
-    cli_white(certificate, info.channels, t->white);
+  status = clt_certify_white(transport, t->white, error);
+  for (int c = 0; !status && c < info.channels; c++) {
+    t->white[c] = t->white[c] > 0 ? t->white[c] : 1;
   }
-  clt_certificate_destroy(certificate);
   return status;
 }
 
@@ -110,7 +117,7 @@ static clt_status simulate(const char *path, task *t, clt_error *error) {
     status = clt_scene_pixel_map(t->station.scene, &t->map, error);
   }
   if (!status) {
-    status = cli_drive_read(t->drive_path, &t->rig.projector, &t->grid, &t->drive, error);
+    status = cli_drive_read(t->drive_path, &t->rig.projector.response[0], &t->grid, &t->drive, error);
   }
   if (!status) {
     status = t->exact ? clt_scene_appearance(t->station.scene, &t->drive, &t->seen, error) : photograph(t, error);
@@ -120,6 +127,9 @@ static clt_status simulate(const char *path, task *t, clt_error *error) {
   }
   if (!status && t->map_path != NULL) {
     status = clt_image_write(t->map_path, NULL, &t->map, error);
+  }
+  if (!status && t->furnace_albedo >= 0.0) {
+    status = clt_scene_furnace(t->station.scene, t->furnace_albedo, &t->furnace, error);
   }
   return status ? status : cli_radiance_write(t->output, &t->seen, t->white, error);
 }
@@ -141,6 +151,11 @@ static int answer(const cli_arguments *arguments, const task *t) {
                           json_pack("{s:i, s:f, s:f, s:f}", "cells", found->cells, "rms", found->rms, "largest",
                                     found->largest, "bound", found->bound));
     }
+    if (t->furnace.elements > 0) {
+      json_object_set_new(document, "furnace",
+                          json_pack("{s:f, s:i, s:f, s:f}", "albedo", t->furnace_albedo, "elements",
+                                    t->furnace.elements, "least", t->furnace.least, "greatest", t->furnace.greatest));
+    }
     return cli_print_json(document);
   }
   if (!arguments->quiet) {
@@ -148,6 +163,11 @@ static int answer(const cli_arguments *arguments, const task *t) {
     if (found->cells > 0) {
       printf("its light is %.2g off the exact one (rms of %d cells; largest %.2g, bound %.2g)\n", found->rms,
              found->cells, found->largest, found->bound);
+    }
+    if (t->furnace.elements > 0) {
+      printf("as a furnace of albedo %g its %d surface elements are %.9g to %.9g bright; a closed room is %.9g\n",
+             t->furnace_albedo, t->furnace.elements, t->furnace.least, t->furnace.greatest,
+             1.0 / (1.0 - t->furnace_albedo));
     }
   }
   return CLI_DONE;
@@ -171,7 +191,7 @@ static int run(const cli_command *command, const cli_arguments *arguments) {
 
 const cli_command cli_command_simulate = {
     .name = "simulate",
-    .synopsis = "SCENE --drive PIC -o OUT [--exact] [--map MAP] [--reference N]",
+    .synopsis = "SCENE --drive PIC -o OUT [--exact] [--map MAP] [--reference N] [--furnace M]",
     .summary = "photograph a simulated scene under a drive",
     .options = options,
     .positional_least = 1,

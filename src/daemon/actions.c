@@ -71,13 +71,16 @@ static void solve(control *self) {
   }
 }
 
-/* The panel's response as well as it is known. */
-static clt_curve response(const control *self) {
-  clt_curve curve = self->found.devices.response;
-  if (self->found.calibrated) {
-    clt_curve_parse(self->found.response, &curve, NULL);
+/* The panel as well as it is known. */
+static clt_panel panel(const control *self) {
+  clt_panel known = self->found.devices.panel;
+  clt_curve curve;
+  if (self->found.calibrated && clt_curve_parse(self->found.response, &curve, NULL) == CLT_OK) {
+    for (int c = 0; c < CLT_PANEL_CHANNELS; c++) {
+      known.response[c] = curve;
+    }
   }
-  return curve;
+  return known;
 }
 
 static void show(control *self) {
@@ -88,7 +91,7 @@ static void show(control *self) {
     free(letter);
     return;
   }
-  letter->response = response(self);
+  letter->panel = panel(self);
   clt_mailbox_put(self->boxes->drives, letter);
 }
 
@@ -123,6 +126,7 @@ static void stop(control *self) {
   if (job != NULL) {
     job->kind = SOLVER_STOP;
     clt_mailbox_put(self->boxes->solver_jobs, job);
+    control_hasten(self);
   }
   order(self, OUTPUT_STOP);
 }

@@ -15,7 +15,7 @@
 #include "daemon/server.h"
 
 /* What a client's deferred reply waits for. */
-enum { WAITS_FOR_CONTENT = 1, WAITS_FOR_SNAPSHOT = 2 };
+enum { WAITS_FOR_CONTENT = 1, WAITS_FOR_SNAPSHOT = 2, WAITS_FOR_TRADEOFF = 3 };
 
 /* What the clients and the configuration asked for and nobody has done yet. */
 typedef struct control_wishes {
@@ -34,6 +34,7 @@ typedef struct control_work {
   uint64_t number;         /* of the newest job of each thread; they share the count */
   uint64_t measure_number; /* newest job of measure */
   bool measuring, solving; /* its answer is not here yet */
+  solver_kind solver_kind; /* of the job that is being solved */
   uint64_t content_ticket, snapshot_ticket;
 } control_work;
 
@@ -48,6 +49,7 @@ typedef struct control_findings {
   transport_facts transport;
   daemon_picture picture;   /* the last drive that was computed */
   uint64_t picture_content; /* content_serial that it is for */
+  json_t *tradeoff;         /* what accuracy costs with that picture; NULL: not measured yet */
   uint64_t content_serial;  /* counts pictures that were asked for */
   char content[CLT_PATH_MAX];
   clt_image observation; /* of the last verification; may be empty */
@@ -99,6 +101,10 @@ void control_act(control *self, machine_action action);
 /* jobs.c */
 void control_measure(control *self, measure_kind kind);
 void control_want(control *self, solver_kind kind);
+/* Tells the solver to give up what can wait. */
+void control_hasten(control *self);
+/* True while what accuracy costs is being measured, or owed. */
+bool control_measures_cost(const control *self);
 void control_on_opened(control *self, output_opened *letter);
 void control_on_measured(control *self, measure_result *letter);
 void control_on_solved(control *self, solver_result *letter);

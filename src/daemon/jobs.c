@@ -100,11 +100,29 @@ static void pump(control *self) {
     return;
   }
   self->work.solving = true;
+  self->work.solver_kind = job->kind;
+  free(clt_mailbox_take(self->boxes->haste, 0)); /* left from the job before */
   clt_mailbox_put(self->boxes->solver_jobs, job);
+}
+
+void control_hasten(control *self) {
+  solver_haste *letter = clt_alloc(1, sizeof *letter);
+  if (letter != NULL) {
+    letter->number = self->work.number;
+    clt_mailbox_put(self->boxes->haste, letter);
+  }
+}
+
+bool control_measures_cost(const control *self) {
+  bool runs = self->work.solving && self->work.solver_kind == SOLVER_COST;
+  return runs || (self->wishes.solver >> SOLVER_COST & 1u) != 0;
 }
 
 void control_want(control *self, solver_kind kind) {
   self->wishes.solver |= 1u << kind;
+  if (self->work.solving && self->work.solver_kind == SOLVER_COST && kind != SOLVER_COST) {
+    control_hasten(self);
+  }
   pump(self);
 }
 
@@ -191,6 +209,8 @@ static void take_picture(control *self, solver_result *letter) {
   letter->picture = (daemon_picture){0};
   self->found.picture_content = self->found.content_serial;
   self->found.verified_error = -1;
+  json_decref(self->found.tradeoff);
+  self->found.tradeoff = NULL;
 }
 
 static void take_content(control *self, const solver_result *letter) {
@@ -216,6 +236,9 @@ static void take_solved(control *self, solver_result *letter) {
   self->wishes.acquire = self->wishes.acquire && letter->kind != SOLVER_ADOPT;
   take_picture(self, letter);
   control_event(self, EVENT_SOLVED);
+  if (self->found.picture.compensated) {
+    control_want(self, SOLVER_COST);
+  }
 }
 
 static void take_loaded(control *self, const solver_result *letter) {
@@ -243,6 +266,21 @@ static void take_snapshot(control *self, const solver_result *letter) {
   json_decref(result);
 }
 
+/* Given up for other work, it is owed still. */
+static void take_cost(control *self, solver_result *letter) {
+  if (letter->error.status == CLT_CANCELLED) {
+    self->wishes.solver |= 1u << SOLVER_COST;
+    return;
+  }
+  if (letter->error.status != CLT_OK) {
+    clt_log(CLT_LOG_WARNING, "what accuracy costs is not known: %s", letter->error.message);
+  }
+  json_decref(self->found.tradeoff);
+  self->found.tradeoff = letter->tradeoff;
+  letter->tradeoff = NULL;
+  server_complete(self->service, WAITS_FOR_TRADEOFF, 0, self->found.tradeoff, &letter->error);
+}
+
 void control_on_solved(control *self, solver_result *letter) {
   self->work.solving = false;
   self->found.transport = letter->facts;
@@ -263,6 +301,9 @@ void control_on_solved(control *self, solver_result *letter) {
   case SOLVER_SNAPSHOT:
     take_snapshot(self, letter);
     break;
+  case SOLVER_COST:
+    take_cost(self, letter);
+    break;
   default:
     break;
   }
@@ -276,4 +317,5 @@ void control_finish_jobs(control *self) {
   }
   daemon_picture_finish(&self->found.picture);
   clt_image_finish(&self->found.observation);
+  json_decref(self->found.tradeoff);
 }

@@ -25,6 +25,7 @@ clt_status daemon_boxes_init(daemon_boxes *boxes, clt_error *error) {
       {&boxes->progress, free},
       {&boxes->measured, measure_result_free},
       {&boxes->solver_jobs, solver_job_free},
+      {&boxes->haste, free},
       {&boxes->solved, solver_result_free},
   };
   for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
@@ -39,7 +40,7 @@ clt_status daemon_boxes_init(daemon_boxes *boxes, clt_error *error) {
 void daemon_boxes_finish(daemon_boxes *boxes) {
   clt_mailbox *all[] = {boxes->orders,   boxes->drives,      boxes->patterns, boxes->answers,
                         boxes->opened,   boxes->frames,      boxes->progress, boxes->measure_jobs,
-                        boxes->measured, boxes->solver_jobs, boxes->solved};
+                        boxes->measured, boxes->solver_jobs, boxes->haste,    boxes->solved};
   for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
     clt_mailbox_destroy(all[i]);
   }
@@ -133,6 +134,7 @@ void solver_job_free(void *letter) {
 void solver_result_free(void *letter) {
   solver_result *gone = letter;
   if (gone != NULL) {
+    json_decref(gone->tradeoff);
     daemon_picture_finish(&gone->picture);
     free(gone);
   }

@@ -17,6 +17,7 @@
 #ifndef CLT_DAEMON_LETTERS_H
 #define CLT_DAEMON_LETTERS_H
 
+#include <jansson.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -34,6 +35,7 @@ typedef struct daemon_boxes {
   clt_mailbox *progress;     /* measure -> control: measure_progress */
   clt_mailbox *measured;     /* measure -> control: measure_result */
   clt_mailbox *solver_jobs;  /* control -> solver: solver_job */
+  clt_mailbox *haste;        /* control -> solver: solver_haste */
   clt_mailbox *solved;       /* solver -> control: solver_result */
   int wake;                  /* eventfd, non-blocking */
 } daemon_boxes;
@@ -54,7 +56,7 @@ typedef struct output_order {
 /* A drive to show from now on: linear light; the panel is a whole multiple of its size, or of one channel. */
 typedef struct output_drive {
   clt_image drive;
-  clt_curve response; /* of the panel */
+  clt_panel panel; /* that it is for */
 } output_drive;
 
 /* A picture of panel codes to show at once and until the next pattern; without codes: measuring has ended, the drive
@@ -73,7 +75,7 @@ typedef struct output_opened {
   clt_station *station;
   clt_projector_info projector;
   char projector_name[32], camera_name[32];
-  clt_curve response; /* of the panel as far as it is known before the rig is */
+  clt_panel panel; /* as far as it is known before the rig is */
 } output_opened;
 
 typedef struct output_frames {
@@ -141,6 +143,7 @@ typedef enum solver_kind {
   SOLVER_ADOPT,    /* certify, solve with and store a new transport */
   SOLVER_SOLVE,    /* compensate the content */
   SOLVER_SNAPSHOT, /* write what is up as pictures */
+  SOLVER_COST,     /* measure what accuracy costs; last, and given up when other work comes */
   SOLVER_STOP,
   SOLVER_KINDS
 } solver_kind;
@@ -162,6 +165,11 @@ typedef struct solver_job {
   clt_image observation;    /* SNAPSHOT; may be empty */
 } solver_job;
 
+/* Other work waits: a SOLVER_COST is to be given up. */
+typedef struct solver_haste {
+  uint64_t number; /* of the job */
+} solver_haste;
+
 /* What is known of the transport in use. */
 typedef struct transport_facts {
   bool present;
@@ -176,6 +184,7 @@ typedef struct solver_result {
   daemon_picture picture;     /* PREPARE, SOLVE, ADOPT */
   transport_facts facts;      /* LOAD, ADOPT, SOLVE */
   char content[CLT_PATH_MAX]; /* CONTENT: its name */
+  json_t *tradeoff;           /* COST */
 } solver_result;
 
 /* Deep copy; `to` is overwritten. CLT_FAILED where memory is short (then `to` is empty). */

@@ -144,16 +144,29 @@ static void answer_reload(control *self, client *from, const rpc_request *reques
   server_reply(from, request, json_pack("{s:s?, s:s}", "restart", restart, "config", self->config.path));
 }
 
+/* Measured once for each picture that was computed; who asks earlier waits. */
+static void answer_tradeoff(control *self, client *from, const rpc_request *request) {
+  if (self->found.tradeoff != NULL) {
+    server_reply(from, request, json_incref(self->found.tradeoff));
+  } else if (control_measures_cost(self)) {
+    server_defer(from, request, WAITS_FOR_TRADEOFF, 0);
+  } else {
+    server_refuse(from, request, RPC_FAILED,
+                  "no compensated picture is up whose cost could be told; ask again when the state is \"showing\"");
+  }
+}
+
 static void answer_subscribe(control *self, client *from, const rpc_request *request) {
   from->subscribed = true;
   server_reply(from, request, control_state_note(self));
 }
 
 static const method methods[] = {
-    {"status", false, {NULL}, answer_status},    {"reacquire", true, {"scope", NULL}, answer_reacquire},
-    {"show", true, {"path", NULL}, answer_show}, {"hold", true, {NULL}, answer_hold},
-    {"resume", true, {NULL}, answer_resume},     {"snapshot", false, {NULL}, answer_snapshot},
-    {"reload", true, {NULL}, answer_reload},     {"subscribe", false, {NULL}, answer_subscribe},
+    {"status", false, {NULL}, answer_status},     {"reacquire", true, {"scope", NULL}, answer_reacquire},
+    {"show", true, {"path", NULL}, answer_show},  {"hold", true, {NULL}, answer_hold},
+    {"resume", true, {NULL}, answer_resume},      {"snapshot", false, {NULL}, answer_snapshot},
+    {"reload", true, {NULL}, answer_reload},      {"subscribe", false, {NULL}, answer_subscribe},
+    {"tradeoff", false, {NULL}, answer_tradeoff},
 };
 enum { METHOD_COUNT = sizeof methods / sizeof methods[0] };
 

@@ -15,7 +15,7 @@ struct output {
   clt_station station;
   bool open, stopping;
   clt_projector_info panel;
-  clt_curve response;  /* of the panel, as far as it is known before the rig is */
+  clt_panel known;     /* the panel's light, as far as it is known before the rig is */
   output_drive *drive; /* the latest; survives a reopening */
   float *codes;        /* of the drive on this panel */
   bool measuring;      /* a pattern is on the glass and stays there */
@@ -51,17 +51,7 @@ void output_destroy(output *main) {
 }
 
 void output_encode(const output_drive *picture, const clt_projector_info *panel, float *codes) {
-  const clt_image *drive = &picture->drive;
-  for (int c = 0; c < panel->channels; c++) {
-    int from = c < drive->channels ? c : 0;
-    for (int y = 0; y < panel->height; y++) {
-      size_t row = ((size_t)from * drive->height + (size_t)y * drive->height / panel->height) * drive->width;
-      for (int x = 0; x < panel->width; x++) {
-        float light = drive->data[row + (size_t)x * drive->width / panel->width];
-        codes[((size_t)c * panel->height + y) * panel->width + x] = (float)clt_curve_encode(&picture->response, light);
-      }
-    }
-  }
+  clt_panel_encode(&picture->panel, &picture->drive, panel->channels, panel->height, panel->width, codes);
 }
 
 /* Makes the drive's codes for the panel that is open. */
@@ -80,11 +70,14 @@ static void encode_drive(output *main) {
   output_encode(main->drive, &main->panel, main->codes);
 }
 
-/* The panel's response before the rig tells: the configuration's, or the one that the scene suggests. */
-static clt_curve known_response(const output *main, const clt_station_config *config) {
+/* The panel before the rig tells: with the configuration's response, or as the scene suggests. */
+static clt_panel known_panel(const output *main, const clt_station_config *config) {
   clt_rig_config suggested = config->rig;
-  if (main->station.scene != NULL && !config->projector_response_given) {
+  if (main->station.scene != NULL) {
     clt_scene_rig_config(main->station.scene, &suggested);
+  }
+  for (int c = 0; c < CLT_PANEL_CHANNELS && config->projector_response_given; c++) {
+    suggested.projector.response[c] = config->rig.projector.response[c];
   }
   return suggested.projector;
 }
@@ -100,7 +93,7 @@ static void report_opened(output *main, const clt_error *error) {
     letter->projector = main->panel;
     snprintf(letter->projector_name, sizeof letter->projector_name, "%s", main->station.projector->driver->name);
     snprintf(letter->camera_name, sizeof letter->camera_name, "%s", main->station.camera->driver->name);
-    letter->response = main->response;
+    letter->panel = main->known;
   }
   daemon_report(main->boxes, main->boxes->opened, letter);
 }
@@ -110,7 +103,7 @@ static void open_station(output *main, const clt_station_config *config) {
   if (!main->open && clt_station_open(config, &main->station, &error) == CLT_OK) {
     main->open = true;
     main->station.projector->driver->describe(main->station.projector, &main->panel);
-    main->response = known_response(main, config);
+    main->known = known_panel(main, config);
     encode_drive(main);
   }
   if (error.status != CLT_OK) {

@@ -63,15 +63,17 @@ static json_t *frame_note(const control_findings *found) {
   return note;
 }
 
-/* What the present accuracy costs, and what limits it. */
+/* What the present accuracy costs, what more or less of it would, and what limits it. */
 static void cost_sentence(const control_findings *found, char *text, size_t size) {
   const clt_compensation *made = &found->picture.compensation;
   if (!found->picture.compensated) {
     snprintf(text, size, "the picture is not compensated: that costs nothing, and interreflection stays");
     return;
   }
-  int used = snprintf(text, size, "%.2g %% error costs %.3g ms a picture by %s", 100 * made->error_after,
-                      1e3 * made->solve.seconds, made->solve.method);
+  const char *measured = json_string_value(json_object_get(found->tradeoff, "sentence"));
+  int used = snprintf(text, size, "%.2g %% error costs %.3g ms a picture by %s%s%s", 100 * made->error_after,
+                      1e3 * made->solve.seconds, made->solve.method, measured != NULL ? "; " : "",
+                      measured != NULL ? measured : "");
   if (found->transport.origin.error >= 0 && used > 0 && (size_t)used < size) {
     snprintf(text + used, size - (size_t)used, "; the acquisition's own error is %.2g %%",
              100 * found->transport.origin.error);
@@ -89,7 +91,7 @@ static json_t *devices_note(const control_findings *found) {
 }
 
 json_t *control_status(const control *self) {
-  char cost[CLT_MESSAGE_MAX];
+  char cost[CLT_MESSAGE_MAX + CLT_TRADEOFF_SENTENCE_MAX];
   json_t *status = control_state_note(self);
   cost_sentence(&self->found, cost, sizeof cost);
   json_object_set_new(status, "version", json_string(CLT_VERSION));

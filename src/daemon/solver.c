@@ -8,6 +8,10 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/places.h"
+#include "tradeoff/json.h"
+
+/* That a measurement of what accuracy costs may take, roughly. */
+static const double COST_SECONDS = 1;
 
 clt_status solver_init(const daemon_boxes *boxes, const store *state, const char *configured, solver *out,
                        clt_error *error) {
@@ -213,10 +217,40 @@ static clt_status snapshot(solver *self, solver_job *job, solver_result *result)
   return status;
 }
 
+/* False, which ends the measurement, where control says that other work waits. */
+static bool is_unhurried(void *context, const char *what, int done, int steps) {
+  (void)what, (void)done, (void)steps;
+  const solver *self = context;
+  void *haste = clt_mailbox_take(self->boxes->haste, 0);
+  free(haste);
+  return haste == NULL;
+}
+
+static clt_status measure_cost(solver *self, solver_job *job, solver_result *result) {
+  clt_error *error = &result->error;
+  if (self->transport == NULL) {
+    return clt_fail(error, CLT_FAILED, "there is no transport to measure with");
+  }
+  clt_transport_info info = clt_transport_describe(self->transport);
+  clt_tradeoff_options options = {
+      .white = job->white, .seconds = COST_SECONDS, .brief = true, .progress = is_unhurried, .context = self};
+  clt_image picture = {0};
+  clt_tradeoff found = {0};
+  clt_status status = fit(self, info.width, info.height, info.channels, &picture, error);
+  status = status == CLT_OK
+               ? clt_tradeoff_measure(self->transport, self->certificate, &picture, &options, &found, error)
+               : status;
+  result->tradeoff = status == CLT_OK ? clt_tradeoff_json(&found) : NULL;
+  clt_tradeoff_finish(&found);
+  clt_image_finish(&picture);
+  return status;
+}
+
 static clt_status work(solver *self, solver_job *job, solver_result *result) {
   static clt_status (*const works[SOLVER_STOP])(solver *, solver_job *, solver_result *) = {
       [SOLVER_CONTENT] = take_content, [SOLVER_PREPARE] = prepare, [SOLVER_LOAD] = load,
       [SOLVER_ADOPT] = adopt,          [SOLVER_SOLVE] = solve,     [SOLVER_SNAPSHOT] = snapshot,
+      [SOLVER_COST] = measure_cost,
   };
   return works[job->kind](self, job, result);
 }

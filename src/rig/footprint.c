@@ -35,5 +35,6 @@ clt_status clt_footprints_align(int grid_width, int grid_height, int camera_widt
 void clt_footprints_finish(clt_footprints *footprints) {
   free(footprints->start);
   free(footprints->pixel);
+  free(footprints->weight);
   *footprints = (clt_footprints){0};
 }

@@ -3,21 +3,21 @@
 #define CLT_RIG_INTERNAL_H
 
 #include "counterlight/rig.h"
+#include "rig/agreement.h"
 #include "rig/footprint.h"
 #include "rig/merge.h"
+#include "rig/shots.h"
 
 typedef struct clt_camera_rig {
   clt_rig base;
   clt_rig_config config;
-  clt_projector *projector;
-  clt_camera *camera;
-  clt_projector_info panel;
-  clt_camera_info sensor;
+  clt_shots shots;
   char response[32]; /* the projector's curve as text */
   clt_footprints footprints;
   clt_merge merge;
-  float *codes; /* panel values, [(c * panel height + y) * panel width + x] */
-  long patterns, frames;
+  clt_agreement agreement; /* empty where nothing is verified */
+  float *codes;            /* panel values, [(c * panel height + y) * panel width + x] */
+  long strange, torn;      /* frames that carried another picture's number; that contradicted the others */
 } clt_camera_rig;
 
 /* clt_rig_operations.observe of the camera rig. */

@@ -11,6 +11,7 @@
  * comes near, and the limit of a single sample then only meets hot pixels. */
 #define SAMPLE_LIMIT 0.98
 #define MEAN_LIMIT 0.95
+#define DEVIATIONS 6            /* that two exposures must lie apart for one to be dead */
 enum { WORTH_SHARING = 32768 }; /* values from which threads pay */
 
 static void fill_tables(clt_merge *merge, const clt_curve *response) {
@@ -53,23 +54,28 @@ void clt_merge_finish(clt_merge *merge) {
   *merge = (clt_merge){0};
 }
 
+/* Means of a footprint's samples; weight is NULL where all count alike. n samples of weights w tell as much as
+ * (sum w)^2 / sum w^2 alike ones. */
 static clt_merge_sum sum_footprint(const clt_merge *merge, const uint16_t *samples, const int32_t *pixel,
-                                   int64_t count) {
+                                   const float *weight, int64_t count) {
   int channels = merge->camera.channels;
-  float light = 0, unsaturated = 0, raw = 0;
+  float light = 0, unsaturated = 0, squares = 0, raw = 0, all = 0;
   for (int64_t p = 0; p < count; p++) {
     uint16_t code = samples[(size_t)pixel[p] * (size_t)channels];
-    raw += code;
+    float w = weight != NULL ? weight[p] : 1;
+    raw += w * code;
+    all += w;
     if (code < merge->saturated) {
-      light += merge->light[code];
-      unsaturated += 1;
+      light += w * merge->light[code];
+      unsaturated += w;
+      squares += w * w;
     }
   }
-  raw /= (float)count;
+  raw /= all;
   if (unsaturated == 0 || raw >= merge->full) {
     return (clt_merge_sum){.raw = raw};
   }
-  return (clt_merge_sum){.light = light / unsaturated, .count = unsaturated, .raw = raw};
+  return (clt_merge_sum){.light = light / unsaturated, .count = unsaturated * unsaturated / squares, .raw = raw};
 }
 
 void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame) {
@@ -80,15 +86,16 @@ void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame) {
 #pragma omp parallel for schedule(static) if (footprints->cells >= WORTH_SHARING)
   for (size_t i = 0; i < footprints->cells; i++) {
     int64_t first = footprints->start[i], count = footprints->start[i + 1] - first;
+    const float *weight = footprints->weight != NULL ? footprints->weight + first : NULL;
     for (int c = 0; c < channels; c++) {
       sums[(size_t)c * footprints->cells + i] =
-          count > 0 ? sum_footprint(merge, frame->samples + c, footprints->pixel + first, count) : (clt_merge_sum){0};
+          count > 0 ? sum_footprint(merge, frame->samples + c, footprints->pixel + first, weight, count)
+                    : (clt_merge_sum){0};
     }
   }
 }
 
-/* Variance of the estimate of the rate by one exposure, were the rate e. */
-static double variance_at(const clt_merge *merge, const clt_merge_sum *sum, double t, double e) {
+double clt_merge_variance(const clt_merge *merge, const clt_merge_sum *sum, double t, double e) {
   const clt_camera_info *camera = &merge->camera;
   double read = camera->read_noise / camera->full_well;
   double step = merge->slope[(int)(sum->raw + 0.5f)] / ((1 << camera->bits) - 1 - camera->black_level);
@@ -96,13 +103,40 @@ static double variance_at(const clt_merge *merge, const clt_merge_sum *sum, doub
   return sample / (t * t * sum->count);
 }
 
-/* The rate e of one cell and channel (sums of successive exposures lie stride apart) and its variance. */
-static double merge_rate(const clt_merge *merge, const clt_merge_sum *sums, size_t stride, double *variance) {
-  double first = 0, longest = 0, bound = 0;
+/* The rate that two exposures prove at the least; 0 where only one shows light, which may be a frame of another
+ * pattern.
+ */
+static double proven_rate(const clt_merge *merge, const clt_merge_sum *sums, size_t stride) {
+  double most = 0, second = 0;
   for (int k = 0; k < merge->exposures; k++) {
     const clt_merge_sum *sum = &sums[(size_t)k * stride];
     double t = merge->seconds[k];
-    if (sum->count > 0 && t > longest) {
+    if (sum->count > 0) {
+      double e = sum->light / t, proven = e - DEVIATIONS * sqrt(clt_merge_variance(merge, sum, t, e));
+      second = fmax(second, fmin(most, proven));
+      most = fmax(most, proven);
+    }
+  }
+  return second;
+}
+
+/* An exposure counts where it is neither saturated nor dead: without light where two others prove that there was
+ * some (a shutter or a lamp that failed). */
+static bool counts(const clt_merge *merge, const clt_merge_sum *sum, double t, double proven) {
+  if (sum->count == 0) {
+    return false;
+  }
+  double e = sum->light / t, dark = DEVIATIONS * sqrt(clt_merge_variance(merge, sum, t, 0));
+  return e > dark || e >= proven - DEVIATIONS * sqrt(clt_merge_variance(merge, sum, t, proven));
+}
+
+/* The rate e of one cell and channel (sums of successive exposures lie stride apart) and its variance. */
+static double merge_rate(const clt_merge *merge, const clt_merge_sum *sums, size_t stride, double *variance) {
+  double first = 0, longest = 0, bound = 0, proven = proven_rate(merge, sums, stride);
+  for (int k = 0; k < merge->exposures; k++) {
+    const clt_merge_sum *sum = &sums[(size_t)k * stride];
+    double t = merge->seconds[k];
+    if (t > longest && counts(merge, sum, t, proven)) {
       longest = t;
       first = sum->light / t;
     }
@@ -118,8 +152,8 @@ static double merge_rate(const clt_merge *merge, const clt_merge_sum *sums, size
     weights = 0;
     for (int k = 0; k < merge->exposures; k++) {
       const clt_merge_sum *sum = &sums[(size_t)k * stride];
-      if (sum->count > 0) {
-        double w = 1 / variance_at(merge, sum, merge->seconds[k], e);
+      if (counts(merge, sum, merge->seconds[k], proven)) {
+        double w = 1 / clt_merge_variance(merge, sum, merge->seconds[k], e);
         weighted += w * sum->light / merge->seconds[k];
         weights += w;
       }

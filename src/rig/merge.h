@@ -5,7 +5,7 @@
  *   (e t / W + (s_r / W)^2 + (h'(v) q)^2 / 12) / t^2
  * (photons, reading, quantisation; W full well in electrons, s_r read noise in electrons, q one code value as a step of
  * v), evaluated at the merged e and not at the sample, so that a dark fluctuation gets no more weight than a bright one
- * (Granados et al. 2010). */
+ * (Granados et al. 2010). Saturated exposures are left out, and so are dead ones, dark where two others show light. */
 #ifndef CLT_RIG_MERGE_H
 #define CLT_RIG_MERGE_H
 
@@ -17,8 +17,8 @@ enum { CLT_EXPOSURES_MAX = 8 };
 
 /* What one exposure tells of one cell and channel. */
 typedef struct clt_merge_sum {
-  float light; /* mean of h over the unsaturated samples */
-  float count; /* their number; 0: the exposure is saturated, or the cell is not seen */
+  float light; /* mean of h over the unsaturated samples, by the footprint's weights */
+  float count; /* their number, of weights alike; 0: the exposure is saturated, or the cell is not seen */
   float raw;   /* mean code value of all samples */
 } clt_merge_sum;
 
@@ -45,5 +45,8 @@ void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame);
  * deviation; both images have the grid's size. Where no exposure is left the deviation is infinite and the radiance is
  * the largest that the exposures prove (0 where the cell is not seen). */
 void clt_merge_radiance(const clt_merge *merge, clt_image *radiance, clt_image *deviation);
+
+/* Variance of the rate that one exposure of t seconds gives a value, were the rate e. */
+double clt_merge_variance(const clt_merge *merge, const clt_merge_sum *sum, double t, double e);
 
 #endif

@@ -4,23 +4,26 @@
 
 #include "base/memory.h"
 #include "counterlight/transport.h"
+#include "rig/calibration.h"
 #include "rig/internal.h"
+#include "rig/timing/patch.h"
 
 static void describe_rig(const clt_rig *base, clt_rig_info *info) {
   const clt_camera_rig *rig = (const clt_camera_rig *)base;
   *info = (clt_rig_info){.width = rig->config.width,
                          .height = rig->config.height,
-                         .channels = rig->sensor.channels,
+                         .channels = rig->shots.sensor.channels,
                          .response = rig->response,
                          .source = rig->config.source,
-                         .patterns = rig->patterns,
-                         .frames = rig->frames};
+                         .patterns = rig->shots.shown,
+                         .frames = rig->shots.frames};
 }
 
 static void close_rig(clt_rig *base) {
   clt_camera_rig *rig = (clt_camera_rig *)base;
   if (rig != NULL) {
     clt_merge_finish(&rig->merge);
+    clt_agreement_finish(&rig->agreement);
     clt_footprints_finish(&rig->footprints);
     free(rig->codes);
     free(rig);
@@ -31,8 +34,8 @@ static const clt_rig_operations camera_rig_operations = {describe_rig, clt_camer
 
 static clt_status check_sizes(const clt_camera_rig *rig, clt_error *error) {
   const clt_rig_config *config = &rig->config;
-  const clt_projector_info *panel = &rig->panel;
-  const clt_camera_info *sensor = &rig->sensor;
+  const clt_projector_info *panel = &rig->shots.panel;
+  const clt_camera_info *sensor = &rig->shots.sensor;
   if (config->width < 1 || config->height < 1 || config->width > CLT_GRID_SIDE_MAX ||
       config->height > CLT_GRID_SIDE_MAX) {
     return clt_fail(error, CLT_BAD_INPUT, "a grid of %d x %d cells; each side is 1 to %d", config->width,
@@ -63,9 +66,9 @@ static clt_status check_timing(const clt_camera_rig *rig, clt_error *error) {
   }
   for (int k = 0; k < config->exposure_count; k++) {
     double seconds = config->exposures_s[k];
-    if (!(seconds >= rig->sensor.exposure_min_s && seconds <= rig->sensor.exposure_max_s)) {
+    if (!(seconds >= rig->shots.sensor.exposure_min_s && seconds <= rig->shots.sensor.exposure_max_s)) {
       return clt_fail(error, CLT_BAD_INPUT, "an exposure of %g ms; the camera takes %g to %g ms", seconds * 1e3,
-                      rig->sensor.exposure_min_s * 1e3, rig->sensor.exposure_max_s * 1e3);
+                      rig->shots.sensor.exposure_min_s * 1e3, rig->shots.sensor.exposure_max_s * 1e3);
     }
     if (k > 0 && !(seconds > config->exposures_s[k - 1])) {
       return clt_fail(error, CLT_BAD_INPUT, "exposures of %g and %g ms in this order; they must ascend",
@@ -81,33 +84,60 @@ static clt_status check_timing(const clt_camera_rig *rig, clt_error *error) {
   return CLT_OK;
 }
 
+/* By the calibration's pixel map, or whole pixels a cell. */
+static clt_status lay_footprints(clt_camera_rig *rig, clt_error *error) {
+  const clt_rig_config *config = &rig->config;
+  const clt_camera_info *sensor = &rig->shots.sensor;
+  const clt_projector_info *panel = &rig->shots.panel;
+  clt_footprint_report report;
+  if (config->calibration == NULL && sensor->own_pixels) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "this camera has pixels of its own: calibrate first (counterlight calibrate); which of its %d x %d "
+                    "pixels see which cell is not known",
+                    sensor->width, sensor->height);
+  }
+  if (config->calibration == NULL) {
+    return clt_footprints_align(config->width, config->height, sensor->width, sensor->height, &rig->footprints, error);
+  }
+  const clt_pixel_map *map = &config->calibration->map;
+  if (map->width != sensor->width || map->height != sensor->height || map->panel_width != panel->width ||
+      map->panel_height != panel->height) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "the calibration is of %d x %d camera and %d x %d panel pixels, the devices have %d x %d and "
+                    "%d x %d; calibrate again",
+                    map->width, map->height, map->panel_width, map->panel_height, sensor->width, sensor->height,
+                    panel->width, panel->height);
+  }
+  return clt_footprints_map(map, config->calibration->info.pitch, config->width, config->height, &rig->footprints, NULL,
+                            &report, error);
+}
+
 static clt_status prepare_rig(clt_camera_rig *rig, clt_error *error) {
   const clt_rig_config *config = &rig->config;
   clt_status status = check_sizes(rig, error);
   if (status == CLT_OK) {
     status = check_timing(rig, error);
   }
-  if (status == CLT_OK && rig->sensor.own_pixels) {
-    status =
-        clt_fail(error, CLT_BAD_INPUT,
-                 "this camera has pixels of its own: calibrate first; which of its %d x %d pixels see which cell is "
-                 "not known",
-                 rig->sensor.width, rig->sensor.height);
+  if (status == CLT_OK) {
+    status = clt_patch_check(&config->patch, config->width, config->height, error);
   }
   if (status == CLT_OK) {
-    status = clt_footprints_align(config->width, config->height, rig->sensor.width, rig->sensor.height,
-                                  &rig->footprints, error);
+    status = lay_footprints(rig, error);
   }
   if (status == CLT_OK) {
-    status =
-        clt_merge_init(&rig->merge, &rig->sensor, &config->camera, &rig->footprints, config->exposure_count, error);
+    status = clt_merge_init(&rig->merge, &rig->shots.sensor, &config->camera, &rig->footprints, config->exposure_count,
+                            error);
+  }
+  if (status == CLT_OK && config->verify && config->exposure_count > 1) {
+    status = clt_agreement_init(&rig->agreement, config->width, config->height, rig->shots.sensor.channels, error);
   }
   if (status != CLT_OK) {
     return status;
   }
-  clt_curve_format(&config->projector, rig->response, sizeof rig->response);
-  size_t pixels = (size_t)rig->panel.width * (size_t)rig->panel.height;
-  rig->codes = clt_alloc(pixels * (size_t)rig->panel.channels, sizeof *rig->codes);
+  clt_curve_format(&config->projector.response[0], rig->response, sizeof rig->response);
+  const clt_projector_info *panel = &rig->shots.panel;
+  size_t pixels = (size_t)panel->width * (size_t)panel->height;
+  rig->codes = clt_alloc(pixels * (size_t)panel->channels, sizeof *rig->codes);
   return rig->codes != NULL ? CLT_OK : clt_fail(error, CLT_FAILED, "out of memory for a panel of %zu pixels", pixels);
 }
 
@@ -119,10 +149,10 @@ clt_status clt_rig_open(const clt_rig_config *config, clt_projector *projector, 
   }
   rig->base.operations = &camera_rig_operations;
   rig->config = *config;
-  rig->projector = projector;
-  rig->camera = camera;
-  projector->driver->describe(projector, &rig->panel);
-  camera->driver->describe(camera, &rig->sensor);
+  clt_shots_init(&rig->shots, projector, camera, config->latency_s, config->timeout_s, config->attempts);
+  if (config->full_well > 0) {
+    clt_shots_calibrate(&rig->shots, config->black_level, config->full_well, config->read_noise);
+  }
   clt_status status = prepare_rig(rig, error);
   if (status != CLT_OK) {
     close_rig(&rig->base);

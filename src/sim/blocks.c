@@ -5,6 +5,7 @@
 
 #include "base/memory.h"
 #include "sim/shaft.h"
+#include "sim/sides.h"
 
 /* Where the error of an interpolation is looked at: Chebyshev polynomials of even order are +-1 at all of -1, 0, 1, and
  * those of odd order at the ends. */
@@ -301,18 +302,20 @@ static void free_generation(generation *of) {
   free(of->blocker);
 }
 
-/* Every pair of surfaces that face each other; each other surface may stand between until it is asked. */
-static bool first_generation(const builder *b, generation *to) {
+/* Every pair of surfaces that face each other; where some surface may stand between, each may until it is asked. */
+static bool first_generation(const builder *b, const clt_sides *sides, generation *to) {
   const clt_parts *parts = b->parts;
   bool few = parts->surface_count <= CULLED_MAX, enough = true;
   int others[CULLED_MAX];
   for (int s = 0; s < parts->surface_count && enough; s++) {
     for (int t = s + 1; t < parts->surface_count && enough; t++) {
-      clt_block block = {.a = b->clusters->root[s], .b = b->clusters->root[t], .blockers = few ? 0 : ANY_SURFACE};
+      bool parted = clt_sides_may_be_parted(sides, s, t, s, t);
+      clt_block block = {.a = b->clusters->root[s], .b = b->clusters->root[t]};
+      block.blockers = parted && !few ? ANY_SURFACE : 0;
       if (block.a < 0 || block.b < 0 || !clt_rectangles_face(&parts->surfaces[s], &parts->surfaces[t])) {
         continue;
       }
-      for (int k = 0; k < parts->surface_count && few; k++) {
+      for (int k = 0; k < parts->surface_count && parted && few; k++) {
         if (k != s && k != t) {
           others[block.blockers++] = k;
         }
@@ -397,8 +400,15 @@ clt_status clt_blocks_init(clt_blocks *blocks, const clt_parts *parts, const clt
                            const clt_accuracy *accuracy, clt_error *error) {
   builder b = {.parts = parts, .clusters = clusters, .accuracy = *accuracy};
   generation now = {.count = 0};
+  clt_sides *sides = NULL;
+  clt_status status =
+      clt_sides_create(parts->surfaces, parts->surface_count, parts->surfaces, parts->surface_count, &sides, error);
+  if (status != CLT_OK) {
+    return status;
+  }
   set_places(&b);
-  bool enough = first_generation(&b, &now);
+  bool enough = first_generation(&b, sides, &now);
+  clt_sides_destroy(sides);
   while (enough && now.count > 0) {
     generation next = {.count = 0};
     judge_all(&b, &now);

@@ -67,8 +67,9 @@ static void spread_over_pixels(simulated_camera *self) {
   }
 }
 
-/* Electrons of a fully exposed pixel are full_well; a negative radiance (of a measured transport) frees none. */
-static void expect_electrons(simulated_camera *self, double exposure_s) {
+/* Electrons of a fully exposed pixel are full_well; a negative radiance (of a measured transport) frees none, nor does
+ * any in the lowest rows, a share `dark` of them. */
+static void expect_electrons(simulated_camera *self, double exposure_s, double dark) {
   const clt_camera_description *sensor = &self->scene->description.camera;
   clt_signal *signal = &self->signal;
   double gain = self->scene->responsivity * exposure_s * sensor->full_well;
@@ -78,7 +79,8 @@ static void expect_electrons(simulated_camera *self, double exposure_s) {
   }
   clt_plan_signal(&self->scene->plan, signal);
   for (size_t k = 0; k < values; k++) {
-    signal->electrons[k] = fmax(0.0, gain * (double)signal->radiance[k]);
+    bool lit = (int)(k / (size_t)signal->width) % signal->height < (1.0 - dark) * signal->height;
+    signal->electrons[k] = lit ? fmax(0.0, gain * (double)signal->radiance[k]) : 0.0;
   }
   clt_plan_electrons(&self->scene->plan, signal);
 }
@@ -191,7 +193,7 @@ static clt_status next(clt_camera *camera, int64_t not_before_ns, double timeout
     return status;
   }
   if (!fate.stuck || !self->delivered) {
-    expect_electrons(self, taken.exposure_s);
+    expect_electrons(self, taken.exposure_s, fate.dark);
     form_samples(self, taken.sequence);
     self->delivered = true;
   }

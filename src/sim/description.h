@@ -25,6 +25,7 @@ typedef struct clt_projector_description {
   int bits;
   double black; /* fraction of full drive that leaks at drive 0: light = black + (1 - black) drive */
   double refresh_s, latency_s;
+  double jitter_s; /* by which the latency varies to either side, by chance */
 } clt_projector_description;
 
 typedef struct clt_camera_description {
@@ -55,7 +56,7 @@ typedef struct clt_drift_description {
 } clt_drift_description;
 
 typedef struct clt_faults_description {
-  double dropped, stuck, late; /* probabilities, of a frame */
+  double dropped, stuck, late, torn; /* probabilities, of a frame */
   double late_s;
 } clt_faults_description;
 

@@ -111,6 +111,39 @@ bool clt_rectangles_face(const clt_rectangle *a, const clt_rectangle *b) {
   return (clt_rectangle_sides(a, b) & 1) != 0 && (clt_rectangle_sides(b, a) & 1) != 0;
 }
 
+static void extent(const clt_rectangle *of, clt_vector axis, double *low, double *high) {
+  *low = INFINITY;
+  *high = -INFINITY;
+  for (int k = 0; k < clt_rectangle_vertices(of); k++) {
+    double at = vec_dot(axis, clt_rectangle_vertex(of, k));
+    *low = fmin(*low, at);
+    *high = fmax(*high, at);
+  }
+}
+
+/* True where a line along an edge of `edges` parts it from `other` on their plane. */
+static bool edge_parts(const clt_rectangle *edges, const clt_rectangle *other) {
+  const double share = 1e-6; /* of the smaller extent: what rounding makes neighbours overlap by, and far more */
+  int corners = clt_rectangle_vertices(edges);
+  for (int k = 0; k < corners; k++) {
+    clt_vector edge = vec_sub(clt_rectangle_vertex(edges, (k + 1) % corners), clt_rectangle_vertex(edges, k));
+    double low[2], high[2];
+    extent(edges, vec_cross(edges->normal, edge), &low[0], &high[0]);
+    extent(other, vec_cross(edges->normal, edge), &low[1], &high[1]);
+    double common = fmin(high[0], high[1]) - fmax(low[0], low[1]);
+    if (common <= share * fmin(high[0] - low[0], high[1] - low[1])) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/* Two convex pieces of a plane have no area in common where an edge of one of them parts them. */
+bool clt_rectangles_coincide(const clt_rectangle *a, const clt_rectangle *b) {
+  return vec_dot(a->normal, b->normal) > 0.5 && clt_rectangle_sides(a, b) == 0 && clt_rectangle_sides(b, a) == 0 &&
+         !edge_parts(a, b) && !edge_parts(b, a);
+}
+
 bool clt_pinhole_aim(clt_pinhole *pinhole, clt_vector target, clt_vector up) {
   clt_vector view = vec_sub(target, pinhole->position);
   clt_vector side = vec_cross(view, up);

@@ -84,6 +84,9 @@ bool clt_rectangles_may_be_parted(const clt_rectangle *rectangles, int count, in
 /* True where some point in front of a sees some point in front of b. */
 bool clt_rectangles_face(const clt_rectangle *a, const clt_rectangle *b);
 
+/* True where the fronts of both lie on each other: on one plane, with an area in common. */
+bool clt_rectangles_coincide(const clt_rectangle *a, const clt_rectangle *b);
+
 /* A pinhole projector or camera: image coordinates x to the right and y up, each from -1 to 1 across the image. */
 typedef struct clt_pinhole {
   clt_vector position, right, up, forward; /* orthonormal axes: right = forward x up' for the scene's up' */

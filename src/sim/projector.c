@@ -2,6 +2,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "sim/noise.h"
 #include "sim/state.h"
 
 typedef struct simulated_projector {
@@ -30,6 +31,18 @@ static int64_t next_refresh(int64_t now_ns, double refresh_s) {
   return start_ns;
 }
 
+/* When the light of a picture that is shown at start_ns is there: never before that of the one before. */
+static int64_t light_follows(clt_scene *scene, int64_t start_ns) {
+  /* Keeps these numbers apart from the noise's and the faults'. */
+  const uint64_t other_seeds = 1ull << 41;
+  uint64_t key = clt_noise_key(scene->description.seed + other_seeds, scene->presented++);
+  int64_t jitter_ns = llround((2.0 * clt_noise_uniform(key, 0) - 1.0) * (double)scene->jitter_ns);
+  int64_t lit_ns = start_ns + scene->latency_ns + jitter_ns;
+  lit_ns = lit_ns > start_ns ? lit_ns : start_ns;
+  scene->lit_ns = lit_ns > scene->lit_ns ? lit_ns : scene->lit_ns;
+  return scene->lit_ns;
+}
+
 static clt_status present(clt_projector *projector, const float *codes, int64_t *shown_ns, clt_error *error) {
   simulated_projector *self = (simulated_projector *)projector;
   clt_scene *scene = self->scene;
@@ -43,7 +56,7 @@ static clt_status present(clt_projector *projector, const float *codes, int64_t 
   pthread_mutex_lock(&scene->lock);
   int64_t start_ns = next_refresh(scene->now_ns, panel->refresh_s);
   clt_timeline_forget(&scene->timeline, scene->now_ns - llround(CLT_EXPOSURE_MAX_S * 1e9));
-  clt_status status = clt_timeline_show(&scene->timeline, self->drive, start_ns + scene->latency_ns, error);
+  clt_status status = clt_timeline_show(&scene->timeline, self->drive, light_follows(scene, start_ns), error);
   if (status == CLT_OK) {
     scene->now_ns = start_ns;
     *shown_ns = start_ns;

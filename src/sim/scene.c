@@ -175,10 +175,16 @@ void clt_scene_rig_config(const clt_scene *scene, clt_rig_config *config) {
   const clt_scene_description *description = &scene->description;
   *config = (clt_rig_config){.width = description->width,
                              .height = description->height,
-                             .projector = description->projector.response,
+                             .projector = clt_panel_of_curve(&description->projector.response),
                              .camera = description->camera.response,
-                             .latency_s = description->projector.latency_s + description->projector.refresh_s,
+                             .latency_s = description->projector.latency_s + description->projector.jitter_s +
+                                          description->projector.refresh_s,
                              .attempts = 3};
+  if (description->channels == CLT_PANEL_CHANNELS) { /* channels that look alike stay as they are */
+    double light[CLT_PANEL_CHANNELS * CLT_PANEL_CHANNELS];
+    memcpy(light, description->effects.crosstalk, sizeof light);
+    clt_panel_set_crosstalk(&config->projector, light, NULL);
+  }
   choose_exposures(scene, config);
   double longest_s = fmax(config->exposures_s[config->exposure_count - 1], description->camera.frame_s);
   config->timeout_s = 1.0 + config->latency_s + longest_s * (description->camera.exposure_delay + 3);

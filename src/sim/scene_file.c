@@ -100,6 +100,7 @@ static void read_projector(clt_section root, clt_scene_description *description)
   projector->black = clt_read_number(section, "black", 0.001, 0.0, 0.5);
   projector->refresh_s = 1.0 / clt_read_number(section, "refresh_hz", 60.0, 1.0, 1000.0);
   projector->latency_s = 1e-3 * clt_read_number(section, "latency_ms", 30.0, 0.0, 10000.0);
+  projector->jitter_s = 1e-3 * clt_read_number(section, "jitter_ms", 0.0, 0.0, 1000.0);
 }
 
 /* A camera has a pose of its own with position and target, or none of a pose's keys; one with pixels of its own may

@@ -21,6 +21,7 @@ struct clt_scene {
   double full_drive[CLT_SIM_CHANNELS_MAX]; /* most drive of a channel that reaches the surfaces */
   float *drive_of_code;                    /* of the panel, 1 << bits values */
   int64_t latency_ns;                      /* from a refresh until its light is on the surface */
+  int64_t jitter_ns;                       /* by which that varies to either side */
   int exposure_delay;                      /* frames from a request until it holds */
   int64_t line_ns;                         /* from the exposure of a row of pixels to that of the next */
   clt_plan plan;
@@ -31,6 +32,8 @@ struct clt_scene {
   /* Below: under lock, for the projector and the camera may be called from two threads. */
   pthread_mutex_t lock;
   clt_timeline timeline;
+  uint64_t presented; /* pictures */
+  int64_t lit_ns;     /* when the last one's light is there */
   int64_t now_ns;
   bool projector_open, camera_open;
 };

@@ -179,6 +179,32 @@ static void read_surface(clt_section item, const clt_material *materials, int co
   }
 }
 
+/* Whether anything is before a surface's front: another surface that faces it, or the projector. */
+static bool has_view(const clt_scene_description *description, int surface) {
+  const clt_rectangle *of = &description->surfaces[surface];
+  bool found = vec_dot(of->normal, vec_sub(description->projector.pinhole.position, of->corner)) > 0.0;
+  for (int k = 0; k < description->surface_count && !found; k++) {
+    found = clt_rectangles_face(of, &description->surfaces[k]);
+  }
+  return found;
+}
+
+/* Light of surfaces that lie on each other would count twice: the front of neither hides the other's. */
+static void refuse_coinciding(clt_section item, const clt_scene_description *description, int first, int end) {
+  for (int k = first; k < end; k++) {
+    for (int other = 0; other < k; other++) {
+      if (clt_rectangles_coincide(&description->surfaces[k], &description->surfaces[other]) &&
+          has_view(description, k)) {
+        clt_section_fail(item, NULL,
+                         "lies flush on %s, facing the same way; move it off by a millimetre, or cut out what it "
+                         "covers",
+                         other < first ? "a surface before it" : "another face of its own");
+        return;
+      }
+    }
+  }
+}
+
 void clt_scene_read_surfaces(clt_section root, clt_scene_description *description) {
   clt_material materials[CLT_MATERIALS_MAX];
   int known = clt_scene_read_materials(root, description, materials);
@@ -187,8 +213,13 @@ void clt_scene_read_surfaces(clt_section root, clt_scene_description *descriptio
     clt_section_fail(root, "surfaces", "has %d surfaces; legal is 1 to %d", count, ENTRIES_MAX);
     return;
   }
+  int end[ENTRIES_MAX];
   for (int k = 0; k < count; k++) {
     read_surface(clt_section_item(root, "surfaces", k), materials, known, description);
+    end[k] = description->surface_count;
+  }
+  for (int k = 0; k < count; k++) {
+    refuse_coinciding(clt_section_item(root, "surfaces", k), description, k > 0 ? end[k - 1] : 0, end[k]);
   }
 }
 

@@ -1,36 +1,49 @@
-/* The bounded problem min ||S l - b||^2 / 2 over 0 <= l <= F, and what its two phases share. */
+/* The bounded problem min ||S l - b||^2 / 2 over 0 <= l <= F, and the model that says where to go next. */
 #ifndef CLT_SOLVE_BOUNDED_H
 #define CLT_SOLVE_BOUNDED_H
 
 #include "solve/method.h"
 
-/* The share of the decrease that the slope promises with which a line search is content (Armijo). */
-#define CLT_SUFFICIENT 1e-4
-
 /* gradient g = -S' r with r = b - S l. The projected gradient l - P(l - g) is 0 exactly at the optimum. */
 typedef struct clt_box {
   clt_system *system;
   clt_run *run;
-  double *light, *gradient, *direction, *descent, *best; /* cols values; light is l, always inside the box */
-  double *residual, *image, *rest;                       /* rows values */
-  double objective;                                      /* ||r||^2 / 2 */
-  double optimality;                                     /* ||l - P(l - g)|| */
-  double target;                                         /* of the optimality */
+  double *light, *gradient, *direction, *curved; /* cols values; light is l, always inside the box; curved is S' S d */
+  double *residual, *image;                      /* rows values; image is S d */
+  double objective;                              /* ||r||^2 / 2 */
+  double optimality;                             /* ||l - P(l - g)|| */
+  double target;                                 /* of the optimality */
 } clt_box;
 
+static inline double clt_box_top(const clt_box *box, size_t j) {
+  return box->system->lit[j] ? box->system->first_bounce[j] : 0;
+}
 /* The nearest value in 0..F of cell j; dark cells have F = 0 here. */
 static inline double clt_box_project(const clt_box *box, size_t j, double value) {
-  double top = box->system->lit[j] ? box->system->first_bounce[j] : 0;
+  double top = clt_box_top(box, j);
   return value < 0 ? 0 : value > top ? top : value;
 }
-/* Computes residual, objective, gradient and optimality of light from scratch. */
-void clt_box_refresh(clt_box *box);
-/* The same where residual is known already. */
-void clt_box_refresh_gradient(clt_box *box);
-bool clt_box_done(const clt_box *box); /* optimal, down in the noise, or told to stop */
 
-/* Minimises over the face of cells that are not held at a bound by the gradient, then projects. `share` is the part of
- * the face's gradient that may be left. False where no projected point along the way is better. */
-bool clt_box_search_face(clt_box *box, double share);
+enum { CLT_SECANTS = 20, CLT_SECANT_VECTORS = 2 * CLT_SECANTS + 3, CLT_SECANT_CELLS = 64 };
+
+/* What the steps so far have shown of H = S' S: B = sigma (I - V (V'V)^-1 V') + Y Y' with Y = H V and V' Y = I, the
+ * positive definite matrix that agrees with H on all of V (block BFGS; Schnabel 1983). */
+typedef struct clt_secants {
+  const clt_box *box;
+  int count;
+  double sigma;                            /* the curvature that is taken for granted elsewhere */
+  double *v[CLT_SECANTS], *y[CLT_SECANTS]; /* cols values each, the oldest first */
+  double *slope, *rest, *open;             /* cols values: g + B d, a right side, and 1 where a cell is free */
+  double gram[CLT_SECANTS][CLT_SECANTS];   /* V' V */
+  double small[4 * CLT_SECANTS * CLT_SECANTS], packed[2 * CLT_SECANTS * CLT_SECANT_CELLS];
+} clt_secants;
+
+/* An empty model; its CLT_SECANT_VECTORS vectors are those of the system from `first`. */
+void clt_secants_open(clt_secants *model, const clt_box *box, size_t first);
+/* Takes in what box->direction has shown: image = S d and curved = H d. */
+void clt_secants_learn(clt_secants *model);
+/* Puts the d that minimises g'd + d'B d / 2 within the box into box->direction; false where the active set did not
+ * settle. */
+bool clt_secants_minimise(clt_secants *model);
 
 #endif

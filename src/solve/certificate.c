@@ -15,6 +15,7 @@ struct clt_certificate {
   clt_channel_certificate channel[CLT_CHANNELS_MAX];
   double *first_bounce, *flux; /* channels x cols */
   unsigned char *lit;
+  clt_model model[CLT_CHANNELS_MAX];
 };
 
 static int compare_numbers(const void *left, const void *right) {
@@ -219,6 +220,31 @@ static clt_status check_finite(clt_system *system, int c, clt_error *error) {
   return CLT_OK;
 }
 
+/* A T whose cells all send their light elsewhere (a mirror, or rows in another order than the columns) looks black on
+ * its diagonal, but is not. */
+static clt_status check_matched(clt_system *system, int c, const clt_channel_certificate *channel,
+                                const double *first_bounce, clt_error *error) {
+  double *ones = clt_system_vector(system, 0), *sums = clt_system_vector(system, 1), most = 0;
+  if (!system->square || channel->lit > 0) {
+    return CLT_OK;
+  }
+  for (size_t i = 0; i < system->rows; i++) {
+    ones[i] = isfinite(first_bounce[i]) ? 1 : 0;
+  }
+  clt_transport_apply_transposed(system->transport, c, ones, sums);
+  for (size_t j = 0; j < system->cols; j++) {
+    most = fmax(most, sums[j] - (isfinite(first_bounce[j]) ? first_bounce[j] : 0));
+  }
+  if (most > 0 && clt_transport_sigma(system->transport, c) == NULL) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "no cell of channel %d shows its own light, but light of up to %.3g goes elsewhere: a mirror, or "
+                    "rows in another order than the columns; put the rows in order, or add one of zeros to the T so "
+                    "that lsmr or bounded take it",
+                    c, most);
+  }
+  return CLT_OK;
+}
+
 static clt_status certify_channel(clt_certificate *certificate, clt_system *system, int c, clt_error *error) {
   clt_channel_certificate *channel = &certificate->channel[c];
   size_t at = (size_t)c * system->cols;
@@ -229,7 +255,8 @@ static clt_status certify_channel(clt_certificate *certificate, clt_system *syst
   channel->dark = system->cols - channel->lit;
   channel->white = quantile(first_bounce, lit, system->cols, 0.5, system->drive);
   clt_system_select(system, c, first_bounce, lit);
-  clt_status status = check_finite(system, c, error);
+  clt_status status = check_matched(system, c, channel, first_bounce, error);
+  status = status == CLT_OK ? check_finite(system, c, error) : status;
   if (status != CLT_OK) {
     return status;
   }
@@ -243,6 +270,7 @@ static clt_status certify_channel(clt_certificate *certificate, clt_system *syst
   certify_radius(system, channel);
   channel->norm_high = bound_norm(system);
   channel->reciprocity = clt_flux_weights(system, flux);
+  clt_model_build(system, &certificate->model[c]);
   return CLT_OK;
 }
 
@@ -280,6 +308,25 @@ clt_status clt_certify(const clt_transport *transport, clt_certificate **out, cl
   return CLT_OK;
 }
 
+clt_status clt_certify_white(const clt_transport *transport, double *white, clt_error *error) {
+  clt_transport_info info = clt_transport_describe(transport);
+  clt_system system = {0};
+  double *first_bounce = clt_alloc(info.cols, sizeof *first_bounce);
+  unsigned char *lit = clt_alloc(info.cols, sizeof *lit);
+  clt_status status = first_bounce != NULL && lit != NULL
+                          ? clt_system_init(&system, transport, false, error)
+                          : clt_fail(error, CLT_FAILED, "not enough memory for the white of %zu cells", info.cols);
+  for (int c = 0; status == CLT_OK && c < info.channels; c++) {
+    measure_first_bounce(&system, c, first_bounce);
+    find_lit(&system, c, first_bounce, lit, system.drive);
+    white[c] = quantile(first_bounce, lit, info.cols, 0.5, system.drive);
+  }
+  clt_system_finish(&system);
+  free(first_bounce);
+  free(lit);
+  return status;
+}
+
 void clt_certificate_destroy(clt_certificate *certificate) {
   if (certificate == NULL) {
     return;
@@ -304,6 +351,10 @@ const double *clt_certificate_first_bounce(const clt_certificate *certificate, i
 
 const double *clt_certificate_flux(const clt_certificate *certificate, int channel) {
   return certificate->flux + (size_t)channel * certificate->cols;
+}
+
+const clt_model *clt_certificate_model(const clt_certificate *certificate, int channel) {
+  return &certificate->model[channel];
 }
 
 bool clt_certificate_fits(const clt_certificate *certificate, const clt_transport *transport) {

@@ -142,11 +142,17 @@ static clt_outcome run_chebyshev(clt_system *system, clt_run *run) {
   return watch.outcome;
 }
 
+static void expect(clt_effort *effort) {
+  clt_effort_chebyshev(effort, clt_albedo_of_radius(effort->channel->radius_high));
+  clt_effort_take(effort, 3, 1, 4);
+}
+
 const clt_method clt_method_chebyshev = {
     .name = "chebyshev",
     .summary = "Chebyshev's iteration between the bounds of the spectrum: near conjugate gradients where many modes "
                "matter, without inner products; raises an upper bound that proves too low",
     .vectors = 4,
     .check = check,
+    .expect = expect,
     .run = run_chebyshev,
 };

@@ -21,6 +21,7 @@ enum {
   STALE_STEPS = 8
 };
 static const double STALE_FACTOR = 0.98; /* of a residual: eight steps that each gain less will not end */
+static const double PASSES = 20;         /* over the entries, in numbers of y += a x, to find the clusters */
 static const double ROUNDING = 1e-12;    /* a stop this low, relative to b, is for lack of digits */
 
 typedef struct edge {
@@ -281,6 +282,17 @@ static clt_outcome run_clusters(clt_system *system, clt_run *run) {
   return CLT_RUN_CONVERGED;
 }
 
+/* Measured on cubes of albedo .2 to .99: a step leaves .1 to .8 of the residual, near Chebyshev's q = m / (1 + sqrt(1 -
+ * m^2)); a single cluster is exact. */
+static void expect(clt_effort *effort) {
+  double n = (double)effort->model->cells, size = fmin(n, CLUSTER_MAX);
+  double m = effort->channel->radius_high / (1 + effort->channel->radius_high);
+  clt_effort_steady(effort, n <= CLUSTER_MAX ? 1e-14 : m / (1 + sqrt(1 - m * m)));
+  clt_effort_take(effort, 3, 1, size + 4);
+  clt_effort_prepare(effort, 2 * n * size * size / 3);
+  effort->prepare_s += PASSES * n * effort->model->vector_s;
+}
+
 const clt_method clt_method_clusters = {
     .name = "clusters",
     .summary = "clusters of at most 256 cells that light each other most, each inverted on its own (Wetzstein & Bimber "
@@ -290,5 +302,6 @@ const clt_method clt_method_clusters = {
     .vectors = 3,
     .prepare = prepare,
     .release = release,
+    .expect = expect,
     .run = run_clusters,
 };

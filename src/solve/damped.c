@@ -23,11 +23,18 @@ static clt_outcome run_damped(clt_system *system, clt_run *run) {
   return clt_richardson(system, run, 1 - m * m, true);
 }
 
+static void expect(clt_effort *effort) {
+  double m = clt_albedo_of_radius(effort->channel->radius_high);
+  clt_effort_richardson(effort, 1 - m * m);
+  clt_effort_take(effort, 2, 1, 2);
+}
+
 const clt_method clt_method_damped = {
     .name = "damped",
     .summary = "jacobi with steps damped by 1 - m^2, m the bound of the albedo: converges at every albedo, by the "
                "factor m an iteration, for transports that are not reciprocal too",
     .vectors = CLT_RICHARDSON_VECTORS,
     .check = check,
+    .expect = expect,
     .run = run_damped,
 };

@@ -70,6 +70,14 @@ static clt_status prepare(clt_system *system, void **prepared, clt_error *error)
   return CLT_OK;
 }
 
+/* The mode that is solved for saves the step that would find it. */
+static void expect(clt_effort *effort) {
+  clt_effort_krylov(effort, false);
+  effort->iterations -= effort->iterations > 1 ? 1 : 0;
+  clt_effort_take(effort, 3, 1, 14);
+  effort->prepare_s = (POWER_STEPS + 1) * effort->model->product_s;
+}
+
 static clt_outcome run_deflated_pcg(clt_system *system, clt_run *run) {
   return clt_cg_run(system, run, system->prepared);
 }
@@ -81,5 +89,6 @@ const clt_method clt_method_deflated_pcg = {
     .vectors = CLT_CG_VECTORS,
     .prepare = prepare,
     .release = release,
+    .expect = expect,
     .run = run_deflated_pcg,
 };

@@ -9,6 +9,7 @@
 
 /* What symmetrising takes from S is at most this share of it; refinement gives it back. */
 static const double RECIPROCAL = 1e-4;
+static const double LEAST = 1e-8;    /* that one solve leaves of a single-precision T */
 static const double SINGULAR = 1e15; /* a condition number that leaves no digit */
 
 typedef struct factor {
@@ -141,6 +142,14 @@ static clt_outcome run_direct(clt_system *system, clt_run *run) {
   return outcome;
 }
 
+static void expect(clt_effort *effort) {
+  double n = (double)effort->model->cells, cube = n * n * n;
+  bool symmetric = effort->channel->reciprocity <= RECIPROCAL;
+  clt_effort_steady(effort, symmetric ? fmax(effort->channel->reciprocity, LEAST) : LEAST);
+  clt_effort_take(effort, 1, 1, 2 * n);
+  clt_effort_prepare(effort, symmetric ? cube / 3 : 2 * cube / 3);
+}
+
 const clt_method clt_method_direct = {
     .name = "direct",
     .summary = "LAPACK's Cholesky factor of the flux-symmetrised S where it is reciprocal, LU elsewhere, refined by "
@@ -150,5 +159,6 @@ const clt_method clt_method_direct = {
     .vectors = CLT_REFINE_VECTORS,
     .prepare = prepare,
     .release = release,
+    .expect = expect,
     .run = run_direct,
 };

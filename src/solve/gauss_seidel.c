@@ -13,6 +13,11 @@ static clt_outcome run_gauss_seidel(clt_system *system, clt_run *run) {
   return clt_relax_run(system, run, clt_relax_in_order, 1);
 }
 
+static void expect(clt_effort *effort) {
+  clt_effort_sweeps(effort, 1, false);
+  clt_relax_expect(effort);
+}
+
 const clt_method clt_method_gauss_seidel = {
     .name = "gauss-seidel",
     .summary = "jacobi in place: each cell sees what the cells before it have become; converges at every albedo where "
@@ -22,5 +27,6 @@ const clt_method clt_method_gauss_seidel = {
     .check = check,
     .prepare = prepare,
     .release = clt_relax_release,
+    .expect = expect,
     .run = run_gauss_seidel,
 };

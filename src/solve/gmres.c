@@ -120,9 +120,16 @@ static clt_outcome run_gmres(clt_system *system, clt_run *run) {
   return CLT_RUN_CONVERGED;
 }
 
+/* Gram-Schmidt goes over the basis four times a step, and the basis grows. */
+static void expect(clt_effort *effort) {
+  clt_effort_krylov(effort, true);
+  clt_effort_take(effort, 3, 1, 2.0 * fmin(effort->iterations, CLT_GMRES_STEPS) + 4);
+}
+
 const clt_method clt_method_gmres = {
     .name = "gmres",
     .summary = "restarted GMRES; needs no symmetry, so it serves gloss, mirrors and noisy transports",
     .vectors = CLT_GMRES_VECTORS + 1,
+    .expect = expect,
     .run = run_gmres,
 };

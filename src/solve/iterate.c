@@ -2,10 +2,11 @@
 
 #include <math.h>
 
-/* A certified iteration may grow for a while (non-normal R); one without a certificate is stopped early. */
-static const double GROWTH_CERTIFIED = 1e6, GROWTH = 10;
+/* A certified iteration may grow for a while (non-normal R); one without a certificate is stopped
+ * earlier. */
+static const double GROWTH_CERTIFIED = 1e6, GROWTH = 1e3;
 static const double ROUNDING = 1e-10; /* of b: below this a residual that no longer falls is held up by rounding */
-enum { GROWING_STEPS = 8, GROWING_STEPS_CERTIFIED = 64, HELD_UP_STEPS = 20 };
+enum { GROWING_STEPS = 16, GROWING_STEPS_CERTIFIED = 64, HELD_UP_STEPS = 20 };
 
 clt_watch clt_watch_open(clt_system *system, clt_run *run, const double *l, double norm, bool certified) {
   clt_run_open(run, norm);

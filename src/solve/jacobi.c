@@ -9,6 +9,11 @@ static clt_outcome run_jacobi(clt_system *system, clt_run *run) {
   return clt_richardson(system, run, 1, run->radius_high < 1);
 }
 
+static void expect(clt_effort *effort) {
+  clt_effort_richardson(effort, 1);
+  clt_effort_take(effort, 2, 1, 2);
+}
+
 const clt_method clt_method_jacobi = {
     .name = "jacobi",
     .summary =
@@ -16,5 +21,6 @@ const clt_method clt_method_jacobi = {
         "a closed room",
     .vectors = CLT_RICHARDSON_VECTORS,
     .check = check,
+    .expect = expect,
     .run = run_jacobi,
 };

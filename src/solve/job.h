@@ -2,7 +2,7 @@
 #ifndef CLT_SOLVE_JOB_H
 #define CLT_SOLVE_JOB_H
 
-#include "solve/method.h"
+#include "solve/choose.h"
 
 /* What a method keeps of one channel, or of all together. */
 typedef struct clt_preparation {
@@ -19,7 +19,8 @@ struct clt_solver {
   clt_solve_options options; /* with the defaults put in */
   const clt_method *method;  /* that runs first */
   bool automatic;
-  int systems; /* that a solve consists of: the channels, or 1 */
+  clt_choice choice; /* of auto */
+  int systems;       /* that a solve consists of: the channels, or 1 */
   clt_system system;
   clt_noise noise[CLT_CHANNELS_MAX]; /* of each system */
   clt_preparation *preparations;

@@ -134,6 +134,15 @@ static void release(void *prepared) {
   }
 }
 
+/* A term is a product of matrices; terms until a step, in the Frobenius norm, is half of the tolerance. */
+static void expect(clt_effort *effort) {
+  double n = (double)effort->model->cells, radius = fmin(effort->channel->radius_high, 0.999);
+  double terms = 1 + log(SHARE * effort->tolerance) / log(fmax(radius, 1e-6));
+  clt_effort_steady(effort, effort->tolerance);
+  clt_effort_take(effort, 1, 0, n);
+  clt_effort_prepare(effort, 2 * n * n * n * fmin(terms, TERMS_MAX));
+}
+
 static clt_outcome run_matrix(clt_system *system, clt_run *run) {
   return clt_stored_run(system->prepared, system, run);
 }
@@ -149,5 +158,6 @@ const clt_method clt_method_matrix = {
     .check = check,
     .prepare = prepare,
     .release = release,
+    .expect = expect,
     .run = run_matrix,
 };

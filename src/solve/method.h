@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "counterlight/solve.h"
+#include "solve/model.h"
 #include "solve/system.h"
 
 /* A reciprocity defect up to here lets conjugate gradients converge. */
@@ -47,6 +48,8 @@ typedef struct clt_method {
   size_t vectors;
   /* NULL, or fails with CLT_BAD_INPUT where the certificate of a channel shows that the method cannot serve. */
   clt_status (*check)(const clt_channel_certificate *channel, clt_error *error);
+  /* Fills what a solve of a channel is expected to take (model.h), on a channel of a transport with rows = cols. */
+  void (*expect)(clt_effort *effort);
   /* NULL, or makes what the method keeps of the selected system for every solve (a factor, a table). The caller ends
    * *prepared by `release` in either case. */
   clt_status (*prepare)(clt_system *system, void **prepared, clt_error *error);
@@ -104,6 +107,8 @@ double clt_flux_weights(clt_system *system, double *w);
 
 /* The worst figures of any channel: the method must serve all of them. */
 clt_channel_certificate clt_certificate_worst(const clt_certificate *certificate);
+/* The small copy of S of a channel. */
+const clt_model *clt_certificate_model(const clt_certificate *certificate, int channel);
 /* True where the certificate was made for a transport of this shape. */
 bool clt_certificate_fits(const clt_certificate *certificate, const clt_transport *transport);
 

@@ -129,6 +129,16 @@ static clt_outcome run_montecarlo(clt_system *system, clt_run *run) {
   return clt_refine(&inverse, system, run);
 }
 
+/* A pass leaves a share of the target that falls with the albedo and the samples (docs/solving.md); a sample takes some
+ * dozens of operations a bounce. */
+static void expect(clt_effort *effort) {
+  static const double SHARE = 0.03, SAMPLE = 80, TABLE = 60;
+  double rho = fmin(effort->channel->radius_high, 0.95), bounces = 1 / (1 - rho);
+  clt_effort_steady(effort, fmin(SHARE * rho * bounces, 0.5));
+  clt_effort_take(effort, 2, 2, SAMPLE * SAMPLES * bounces);
+  effort->prepare_s = TABLE * (double)effort->model->cells * effort->model->vector_s;
+}
+
 const clt_method clt_method_montecarlo = {
     .name = "montecarlo",
     .summary =
@@ -140,6 +150,7 @@ const clt_method clt_method_montecarlo = {
     .check = check,
     .prepare = prepare,
     .release = release,
+    .expect = expect,
     .run = run_montecarlo,
 };
 
@@ -154,5 +165,6 @@ const clt_method clt_method_hybrid = {
     .check = check,
     .prepare = prepare_hybrid,
     .release = release,
+    .expect = expect,
     .run = run_montecarlo,
 };

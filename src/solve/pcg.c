@@ -170,6 +170,11 @@ clt_outcome clt_cg_run(clt_system *system, clt_run *run, const clt_flat_mode *fl
   return rounding ? CLT_RUN_STOPPED : outcome;
 }
 
+static void expect(clt_effort *effort) {
+  clt_effort_krylov(effort, false);
+  clt_effort_take(effort, 3, 1, 8);
+}
+
 static clt_outcome run_pcg(clt_system *system, clt_run *run) {
   return clt_cg_run(system, run, NULL);
 }
@@ -179,5 +184,6 @@ const clt_method clt_method_pcg = {
     .summary = "conjugate gradients in the flux-weighted inner product; the fastest where the scene is diffuse "
                "(reciprocity defect up to 0.1), at any albedo",
     .vectors = CLT_CG_VECTORS,
+    .expect = expect,
     .run = run_pcg,
 };

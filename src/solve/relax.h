@@ -23,6 +23,9 @@ void clt_relax_release(void *prepared);
  * to 1 at least (Varga 1962). */
 clt_status clt_relax_check(const char *method, const clt_channel_certificate *channel, clt_error *error);
 
+/* What a sweep over the entries costs, and making them ready. */
+void clt_relax_expect(clt_effort *effort);
+
 enum { CLT_RELAX_VECTORS = 3 };
 typedef struct clt_relax_state {
   clt_system *system;

@@ -24,11 +24,17 @@ static clt_outcome run_series(clt_system *system, clt_run *run) {
   return watch.outcome;
 }
 
+static void expect(clt_effort *effort) {
+  clt_effort_richardson(effort, 1);
+  clt_effort_take(effort, 3, 1, 3);
+}
+
 const clt_method clt_method_series = {
     .name = "series",
     .summary = "the inverse series b - R b + R R b - ... (eq. 16), the stratified inverses of Ng et al. 2009, term by "
                "term; converges where jacobi does, with the same iterates",
     .vectors = 3,
     .check = check,
+    .expect = expect,
     .run = run_series,
 };

@@ -15,7 +15,8 @@ static clt_status choose_method(clt_solver *solver, clt_error *error) {
   const char *name = solver->options.method;
   solver->automatic = name == NULL || strcmp(name, "auto") == 0;
   if (solver->automatic) {
-    solver->method = clt_choose_first(solver->certificate, &solver->info);
+    clt_choose_first(solver->certificate, &solver->info, &solver->options, &solver->choice);
+    solver->method = solver->choice.method;
     return CLT_OK;
   }
   clt_status status = clt_choose_named(name, &solver->method, error);

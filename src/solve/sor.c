@@ -31,6 +31,11 @@ static clt_outcome run_sor(clt_system *system, clt_run *run) {
   return clt_relax_run(system, run, clt_relax_in_order, TWO_PI / (TWO_PI + run->radius_high));
 }
 
+static void expect(clt_effort *effort) {
+  clt_effort_sweeps(effort, TWO_PI / (TWO_PI + effort->channel->radius_high), false);
+  clt_relax_expect(effort);
+}
+
 const clt_method clt_method_sor = {
     .name = "sor",
     .summary = "gauss-seidel with successive under-relaxation, omega from the bound of rho(R): three times as fast as "
@@ -40,5 +45,6 @@ const clt_method clt_method_sor = {
     .check = check,
     .prepare = prepare,
     .release = clt_relax_release,
+    .expect = expect,
     .run = run_sor,
 };

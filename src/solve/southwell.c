@@ -26,6 +26,11 @@ static clt_outcome run_southwell(clt_system *system, clt_run *run) {
   return clt_relax_run(system, run, largest_first, 1);
 }
 
+static void expect(clt_effort *effort) {
+  clt_effort_sweeps(effort, 1, true);
+  clt_relax_expect(effort);
+}
+
 const clt_method clt_method_southwell = {
     .name = "southwell",
     .summary = "relaxes the cell with the largest residual first; cheap where little of the picture is lit or has "
@@ -35,5 +40,6 @@ const clt_method clt_method_southwell = {
     .check = check,
     .prepare = prepare,
     .release = clt_relax_release,
+    .expect = expect,
     .run = run_southwell,
 };

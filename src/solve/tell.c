@@ -40,6 +40,22 @@ static void add_text(char *text, size_t size, const char *format, ...) {
   va_end(arguments);
 }
 
+/* The bounds that decide which methods serve, and the figures that decide between those. */
+static void tell_choice(const clt_solver *solver, char *text, size_t size) {
+  clt_channel_certificate worst = clt_certificate_worst(solver->certificate);
+  const clt_choice *choice = &solver->choice;
+  add_text(text, size, "reciprocity defect %.2g and rho(R) in [%.2g, %.2g]: %s, %d iterations and %.3g ms expected",
+           worst.reciprocity, worst.radius_low, worst.radius_high, choice->method->name, choice->expected.iterations,
+           1e3 * choice->expected.seconds);
+  if (choice->expected.residual > solver->options.tolerance) {
+    add_text(text, size, " to come to %.2g in time", choice->expected.residual);
+  }
+  if (choice->next != NULL) {
+    add_text(text, size, " (%s: %d and %.3g ms)", choice->next->name, choice->next_expected.iterations,
+             1e3 * choice->next_expected.seconds);
+  }
+}
+
 static void tell_reason(const clt_job *job, clt_solve_result *result) {
   char *text = result->reason;
   size_t size = sizeof result->reason;
@@ -49,9 +65,7 @@ static void tell_reason(const clt_job *job, clt_solve_result *result) {
     add_text(text, size, "%zu rows for %zu columns: bounded least squares", job->solver->info.rows,
              job->solver->info.cols);
   } else {
-    clt_channel_certificate worst = clt_certificate_worst(job->solver->certificate);
-    add_text(text, size, "reciprocity defect %.2g and rho(R) in [%.2g, %.2g]: %s", worst.reciprocity, worst.radius_low,
-             worst.radius_high, job->solver->method->name);
+    tell_choice(job->solver, text, size);
   }
   if (job->broken != NULL) {
     add_text(text, size, "; %s stopped as %s, so %s", job->broken->name, job->why, job->replacement->name);

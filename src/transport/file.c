@@ -54,6 +54,7 @@ static const struct {
   const char *name;
   size_t offset; /* of a char[CLT_TEXT_MAX] */
 } provenance_texts[] = {{"scheme", offsetof(clt_provenance, scheme)},
+                        {"plan", offsetof(clt_provenance, plan)},
                         {"source", offsetof(clt_provenance, source)},
                         {"response", offsetof(clt_provenance, response)}};
 enum { PROVENANCE_TEXTS = sizeof provenance_texts / sizeof provenance_texts[0] };

@@ -2,6 +2,8 @@
 #ifndef CLT_TESTS_ACQUIRE_FAKE_RIG_H
 #define CLT_TESTS_ACQUIRE_FAKE_RIG_H
 
+#include <signal.h>
+
 #include "counterlight/rig.h"
 #include "noise.h"
 
@@ -16,6 +18,8 @@ typedef struct fake_rig {
   size_t blind;  /* this cell is never seen; SIZE_MAX: none */
   uint64_t random;
   long patterns;
+  unsigned pause_us;     /* that an observation takes */
+  long dies_at;          /* kill -9 of the process before that pattern; 0: never */
   clt_status fails_with; /* from pattern fails_at on */
   long fails_at;
 } fake_rig;
@@ -42,6 +46,12 @@ static inline clt_status fake_observe(clt_rig *base, const clt_image *drive, clt
                                       clt_error *error) {
   fake_rig *rig = (fake_rig *)base;
   size_t cells = (size_t)rig->width * (size_t)rig->height, *lit = calloc(cells, sizeof *lit);
+  if (rig->dies_at > 0 && rig->patterns + 1 >= rig->dies_at) {
+    kill(getpid(), SIGKILL);
+  }
+  if (rig->pause_us > 0) {
+    usleep(rig->pause_us);
+  }
   if (++rig->patterns >= rig->fails_at && rig->fails_with != CLT_OK) {
     free(lit);
     return clt_fail(error, rig->fails_with, "the fake is told to fail");

@@ -226,12 +226,15 @@ static void bad_options_are_refused_before_any_pattern(void **state) {
     clt_acquire_options options;
     const char *wanted;
   } cases[] = {
-      {{.scheme = "magic"}, "\"magic\" is no acquisition scheme; there are auto, brute, hierarchical"},
+      {{.scheme = "magic"},
+       "\"magic\" is no acquisition scheme; there are auto, brute, hadamard, hierarchical, blocks"},
       {{.threshold = 0.6}, "threshold is 0.6; legal is 0 to 0.5"},
       {{.threshold = NAN}, "threshold is nan"},
       {{.repeats = 257}, "repeats is 257; legal is 0 (the default) to 256"},
       {{.repeats = -1}, "repeats is -1"},
       {{.checks = 65}, "checks is 65; legal is 0 to 64"},
+      {{.error = 0.6}, "the wanted error is 0.6"},
+      {{.seconds = -1}, "the seconds allowed are -1"},
   };
   for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
     fake_rig rig = small_rig();
@@ -245,19 +248,48 @@ static void bad_options_are_refused_before_any_pattern(void **state) {
   }
 }
 
-static void auto_takes_brute_force_on_the_smallest_grids_only(void **state) {
+/* Scheme and plan by grid, wanted error and seconds; patterns that cost nothing fit into any time. */
+static void auto_weighs_patterns_against_error(void **state) {
   (void)state;
-  fake_rig rig = small_rig();
-  clt_transport *transport = acquire(&rig, &(clt_acquire_options){0});
-  assert_string_equal(clt_transport_origin(transport)->scheme, "brute");
-  clt_transport_destroy(transport);
-  static double identity[100 * 100];
-  for (int i = 0; i < 100; i++) {
-    identity[i * 101] = 1;
+  static double identity[400 * 400];
+  for (int i = 0; i < 400; i++) {
+    identity[i * 401] = 1;
   }
-  rig = fake_rig_make(10, 10, 1, identity, 1);
-  transport = acquire(&rig, &(clt_acquire_options){.scheme = "auto"});
-  assert_string_equal(clt_transport_origin(transport)->scheme, "hierarchical");
+  static const struct {
+    int side;
+    double error, seconds;
+    const char *scheme;
+  } cases[] = {{5, 0, 0, "brute"},       {20, 0, 0, "hierarchical"}, {20, 0.02, 0, "blocks"},
+               {20, 0.0034, 0, "brute"}, {20, 0.02, 1e6, "blocks"},  {5, 0.003, 1e6, "brute"}};
+  for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+    fake_rig rig = fake_rig_make(cases[n].side, cases[n].side, 1, identity, 1);
+    if (cases[n].side == 5) {
+      rig = small_rig();
+    }
+    clt_acquire_options options = {.scheme = "auto", .error = cases[n].error, .seconds = cases[n].seconds};
+    clt_transport *transport = acquire(&rig, &options);
+    const clt_provenance *origin = clt_transport_origin(transport);
+    assert_string_equal(origin->scheme, cases[n].scheme);
+    assert_non_null(strstr(origin->plan, cases[n].scheme));
+    assert_non_null(strstr(origin->plan, "patterns"));
+    clt_transport_destroy(transport);
+  }
+}
+
+/* On a rig that takes 10 ms a pattern, a time too short for one pattern a cell chooses and ends the scheme. */
+static void auto_keeps_to_the_seconds_allowed(void **state) {
+  (void)state;
+  static double identity[400 * 400];
+  for (int i = 0; i < 400; i++) {
+    identity[i * 401] = 1;
+  }
+  fake_rig rig = fake_rig_make(20, 20, 1, identity, 1);
+  rig.pause_us = 10000;
+  clt_transport *transport = acquire(&rig, &(clt_acquire_options){.error = 0.001, .seconds = 1});
+  const clt_provenance *origin = clt_transport_origin(transport);
+  assert_string_equal(origin->scheme, "blocks");
+  assert_non_null(strstr(origin->plan, "of 1 s"));
+  assert_true(origin->patterns < 100);
   clt_transport_destroy(transport);
 }
 
@@ -282,7 +314,8 @@ int main(void) {
       cmocka_unit_test(cancelling_stops_at_the_next_pattern),
       cmocka_unit_test(a_failing_rig_is_passed_on),
       cmocka_unit_test(bad_options_are_refused_before_any_pattern),
-      cmocka_unit_test(auto_takes_brute_force_on_the_smallest_grids_only),
+      cmocka_unit_test(auto_weighs_patterns_against_error),
+      cmocka_unit_test(auto_keeps_to_the_seconds_allowed),
       cmocka_unit_test(a_dark_room_is_an_error),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -195,6 +195,21 @@ static void channels_share_their_patterns(void **state) {
   free(all);
 }
 
+/* With noise of .3 % of a cell's light a hundredth of that as tau asks for no more patterns than the noise is worth,
+ * and costs no accuracy; without noise the same tau takes what it says. */
+static void refinement_stops_at_the_noise(void **state) {
+  (void)state;
+  test_room room = make_room(24, 20, 0.5);
+  const clt_acquire_options fine = {.scheme = "hierarchical", .threshold = 3e-5},
+                            coarse = {.scheme = "hierarchical", .threshold = 3e-3};
+  const outcome clean = measure(&room, &fine, 0, 0, 5), noisy = measure(&room, &fine, 3e-3, 0, 5);
+  const outcome enough = measure(&room, &coarse, 3e-3, 0, 5);
+  assert_true(noisy.patterns < clean.patterns / 4);
+  assert_true(noisy.patterns <= 1.2 * enough.patterns);
+  assert_true(noisy.random < 1.3 * enough.random && noisy.half < 1.3 * enough.half);
+  free(room.transport);
+}
+
 /* Noisy light must neither leave entries that a transport file refuses (below -1 % of the largest) nor spoil the row
  * sums: here the own light of a cell is uncertain by 2 %. */
 static void noise_leaves_no_negative_light(void **state) {
@@ -235,6 +250,7 @@ int main(void) {
       cmocka_unit_test(sharp_indirect_light_is_found),
       cmocka_unit_test(large_grids_become_trees),
       cmocka_unit_test(channels_share_their_patterns),
+      cmocka_unit_test(refinement_stops_at_the_noise),
       cmocka_unit_test(noise_leaves_no_negative_light),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

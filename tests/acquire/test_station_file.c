@@ -43,8 +43,8 @@ static void everything_is_read(void **state) {
   assert_string_equal(config.projector, "simulated");
   assert_string_equal(config.camera, "other");
   assert_true(config.projector_response_given && config.camera_response_given);
-  assert_int_equal(config.rig.projector.kind, CLT_CURVE_GAMMA);
-  assert_near(config.rig.projector.gamma, 2.4, 1e-12);
+  assert_int_equal(config.rig.projector.response[0].kind, CLT_CURVE_GAMMA);
+  assert_near(config.rig.projector.response[0].gamma, 2.4, 1e-12);
   assert_int_equal(config.rig.camera.kind, CLT_CURVE_LINEAR);
   assert_int_equal(config.rig.width, 64);
   assert_int_equal(config.rig.height, 48);
@@ -91,7 +91,8 @@ static void mistakes_are_named(void **state) {
       {"rig = { timeout = 5; };", "timeout: is not a known key"},
       {"projector = { response = \"cubic\"; };", "response: "},
       {"camera = { driver = 5; };", "driver: must be a text"},
-      {"acquire = { scheme = \"magic\"; };", "is \"magic\"; legal is \"auto\", \"brute\", \"hierarchical\""},
+      {"acquire = { scheme = \"magic\"; };",
+       "is \"magic\"; legal is \"auto\", \"brute\", \"hadamard\", \"hierarchical\", \"blocks\""},
       {"acquire = { threshold = 0.7; };", "is 0.7; legal is 0 to 0.5"},
       {"acquire = { checks = 65; };", "is 65; legal is 0 to 64"},
       {"acquire = { seeds = 1; };", "seeds: is not a known key"},

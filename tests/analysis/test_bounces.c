@@ -252,8 +252,8 @@ static void dark_cells_show_their_share(void **state) {
   free(pivots);
 }
 
-/* Case 23: T seen through a blur along the grid has A_ii != 0. */
-static void spread_is_flagged(void **state) {
+/* T seen through a blur along the grid has A_ii != 0. */
+static void case_23_subsurface_or_defocus(void **state) {
   (void)state;
   for (int n = 0; n < 3; n++) {
     int side = 16;
@@ -393,7 +393,7 @@ int main(void) {
       cmocka_unit_test(eq51_cancels_where_ours_does_not),
       cmocka_unit_test(a_picture_comes_apart_like_its_drive),
       cmocka_unit_test(dark_cells_show_their_share),
-      cmocka_unit_test(spread_is_flagged),
+      cmocka_unit_test(case_23_subsurface_or_defocus),
       cmocka_unit_test(channels_do_not_mix),
       cmocka_unit_test(refusals_say_why),
   };

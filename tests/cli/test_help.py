@@ -4,8 +4,8 @@ import sys
 import unittest
 
 PROGRAM = sys.argv[1]
-COMMANDS = ("demo acquire compensate relight bounces separate repaint inspect reproduce simulate scene status show watch "
-            "reacquire snapshot hold resume reload").split()
+COMMANDS = ("demo calibrate acquire compensate relight bounces separate repaint inspect tradeoff reproduce simulate scene "
+            "status show watch reacquire snapshot hold resume reload").split()
 
 
 def run(*words):

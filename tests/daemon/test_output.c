@@ -6,7 +6,7 @@
 static void cells_cover_their_pixels(void **state) {
   (void)state;
   clt_error error = {0};
-  output_drive picture = {.response = {CLT_CURVE_GAMMA, 2.0}};
+  output_drive picture = {.panel = clt_panel_of_curve(&(clt_curve){.kind = CLT_CURVE_GAMMA, .gamma = 2.0})};
   assert_ok(clt_image_init(&picture.drive, 3, 2, 3, &error), error);
   for (int i = 0; i < 18; i++) {
     picture.drive.data[i] = (float)i / 17;
@@ -28,7 +28,7 @@ static void cells_cover_their_pixels(void **state) {
 static void one_channel_lights_all_of_the_panel(void **state) {
   (void)state;
   clt_error error = {0};
-  output_drive picture = {.response = {.kind = CLT_CURVE_LINEAR}};
+  output_drive picture = {.panel = {.mixes = false}};
   assert_ok(clt_image_init(&picture.drive, 1, 1, 2, &error), error);
   picture.drive.data[0] = 0.25F, picture.drive.data[1] = 2;
   const clt_projector_info panel = {.width = 2, .height = 1, .channels = 3};

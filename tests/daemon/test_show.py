@@ -1,4 +1,5 @@
 """From the start to showing, what the status says, other pictures, snapshots, holding."""
+import json
 import os
 import subprocess
 
@@ -72,6 +73,40 @@ def unfilter(kind, row, above, step):
         paeth = min((left, up, corner), key=lambda v: abs(guess - v))
         out[i] = (value + (0, left, up, (left + up) // 2, paeth)[kind]) % 256
     return out
+
+
+def tells_what_accuracy_costs():
+    with exhibit() as run:
+        run.start()
+        with run.client() as client:
+            early = client.call("tradeoff")
+            assert "error" not in early or early["error"]["code"] == -32000, early
+            run.wait_state("showing")
+            found = client.ask("tradeoff")
+            assert found["grid"] == {"width": 16, "height": 12, "channels": 3}
+            front = found["front"]
+            assert front and found["sentence"] and found["chosen"]["method"], found
+            times, errors = [p["time_ms"] for p in front], [p["error"] for p in front]
+            assert times == sorted(times) and errors == sorted(errors, reverse=True), front
+            for point in front:
+                parts = [point["solver_error"], point["storage_error"], point["clipping_error"]]
+                assert 2 * max(parts) - sum(parts) - 1e-9 <= point["error"] <= sum(parts) + 1e-9, point
+            assert found["chosen"]["error"] in errors
+            assert found["sentence"] in client.ask("status")["cost"]
+            assert client.refused("tradeoff", size=3)["code"] == -32602
+            assert len(json.dumps(client.call("tradeoff"))) < 65536
+            # another picture has other costs; who asks meanwhile waits, and no request waits for the measurement
+            other = run.folder / "other.npy"
+            numpy.save(other, numpy.full((3, 12, 16), 0.4, numpy.float32))
+            for k in range(3):
+                client.ask("show", path=str(other if k % 2 == 0 else run.content))
+            client.ask("subscribe")
+            if client.ask("status")["state"] != "showing":
+                client.until("showing")
+            again = client.ask("tradeoff")
+            assert again["limit"] <= run.status()["frame"]["error"] + 1e-6
+        code, seconds = run.stop()
+        assert code == 0 and seconds < 3
 
 
 def a_stored_transport_is_used_at_once():
@@ -231,7 +266,7 @@ def checks_what_it_is_given():
 
 
 if __name__ == "__main__":
-    main([reaches_showing_and_says_how_well, a_stored_transport_is_used_at_once,
+    main([reaches_showing_and_says_how_well, tells_what_accuracy_costs, a_stored_transport_is_used_at_once,
           another_picture_is_shown_and_survives_a_restart, what_is_no_picture_is_refused_and_nothing_changes,
           a_snapshot_photographs_what_is_up, hold_keeps_the_picture_and_resume_goes_on,
           holds_and_retries_where_the_rig_cannot_work, checks_what_it_is_given])

@@ -23,12 +23,12 @@ def malformed_half_and_unknown_requests_are_answered():
                                (b'{"jsonrpc":"2.0","id":1,"method":"status","params":{"x":1}}\n', -32602),
                                (b'{"jsonrpc":"2.0","id":1,"method":"stat\xff"}\n', -32700),
                                (b"\0\0\0\n", -32700), (b"[" * 60000 + b"\n", -32700),
-                               (request("tradeoff"), -32601), (request("x" * 5000), -32601)):
+                               (request("trade"), -32601), (request("x" * 5000), -32601)):
                 client.send(data)
                 reply = client.line()
                 assert reply["error"]["code"] == code, (data[:60], reply)
             error = client.refused("no-such-method")
-            for name in ("status", "reacquire", "show", "hold", "resume", "snapshot", "reload", "subscribe"):
+            for name in ("status", "reacquire", "show", "hold", "resume", "snapshot", "reload", "subscribe", "tradeoff"):
                 assert name in error["message"], error
             text = request("status")
             for at in range(1, len(text)):

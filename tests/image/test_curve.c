@@ -104,11 +104,90 @@ static void other_texts_are_refused_with_what_is_allowed(void **state) {
   }
 }
 
+/* A table of any monotone curve: through its points, monotone between them, undone by encoding; and within the error
+ * of cubics of the curve it was made from. */
+static void tables_follow_what_they_were_made_from(void **state) {
+  (void)state;
+  static const struct {
+    const char *text;
+    int points;
+    double tolerance;
+  } cases[] = {{"linear", 2, 1e-15}, {"gamma 2.2", 65, 2e-5}, {"srgb", 33, 1.2e-4}, {"gamma 1.8", 64, 5e-5}};
+  for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+    clt_curve curve, table;
+    clt_error error = {0};
+    double codes[65], light[65];
+    assert_ok(clt_curve_parse(cases[n].text, &curve, &error), error);
+    for (int i = 0; i < cases[n].points; i++) { /* codes of a panel of 8 bits, not equidistant */
+      codes[i] = rint(255.0 * i / (cases[n].points - 1)) / 255;
+      light[i] = clt_curve_decode(&curve, codes[i]);
+    }
+    assert_ok(clt_curve_from_points(codes, light, cases[n].points, &table, &error), error);
+    assert_int_equal(table.kind, CLT_CURVE_TABLE);
+    double before = -1;
+    for (int i = 0; i <= 20000; i++) {
+      double at = i / 20000.0, value = clt_curve_decode(&table, at);
+      assert_near(value, clt_curve_decode(&curve, at), cases[n].tolerance);
+      assert_true(value > before || i == 0);
+      assert_near(clt_curve_decode(&table, clt_curve_encode(&table, at)), at, 1e-13);
+      before = value;
+    }
+  }
+}
+
+/* Random rising tables, with flat stretches: monotone, and encoding gives a code of that light. */
+static void tables_keep_their_order(void **state) {
+  (void)state;
+  uint64_t random = 9;
+  for (int round = 0; round < 50; round++) {
+    clt_curve table = {.kind = CLT_CURVE_TABLE};
+    double sum = 0;
+    for (int i = 1; i < CLT_CURVE_SAMPLES; i++) {
+      sum += test_random(&random) < 0.3 ? 0 : pow(test_random(&random), 4);
+      table.table[i] = sum;
+    }
+    for (int i = 1; i < CLT_CURVE_SAMPLES; i++) {
+      table.table[i] /= sum;
+    }
+    double before = 0;
+    for (int i = 0; i <= 6400; i++) {
+      double value = clt_curve_decode(&table, i / 6400.0);
+      assert_true(value >= before - 1e-15 && value <= 1);
+      assert_true(i % 100 != 0 || fabs(value - table.table[i / 100]) < 1e-14);
+      assert_near(clt_curve_decode(&table, clt_curve_encode(&table, i / 6400.0)), i / 6400.0, 1e-12);
+      before = value;
+    }
+    assert_true(clt_curve_decode(&table, 0) == 0 && clt_curve_decode(&table, 1) == 1);
+    assert_true(clt_curve_encode(&table, 0) == 0 && clt_curve_encode(&table, 1) == 1);
+  }
+}
+
+static void broken_tables_are_refused(void **state) {
+  (void)state;
+  const double codes[] = {0, 0.5, 1}, wrong_codes[] = {0, 0, 1}, light[] = {0, 0.4, 1}, falls[] = {0, 1.2, 1},
+               lifted[] = {0.1, 0.4, 1};
+  clt_curve curve;
+  clt_error error = {0};
+  assert_int_equal(clt_curve_from_points(wrong_codes, light, 3, &curve, &error), CLT_BAD_INPUT);
+  assert_int_equal(clt_curve_from_points(codes, falls, 3, &curve, &error), CLT_BAD_INPUT);
+  assert_non_null(strstr(error.message, "from (0.5, 1.2) to (1, 1)"));
+  assert_int_equal(clt_curve_from_points(codes, lifted, 3, &curve, &error), CLT_BAD_INPUT);
+  assert_int_equal(clt_curve_from_points(codes, light, 1, &curve, &error), CLT_BAD_INPUT);
+  assert_int_equal(clt_curve_parse("table", &curve, &error), CLT_BAD_INPUT);
+  assert_non_null(strstr(error.message, "calibration"));
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(srgb_is_the_standards_curve),   cmocka_unit_test(curves_are_monotone_and_keep_black_and_white),
-      cmocka_unit_test(encoding_undoes_decoding),      cmocka_unit_test(gamma_is_a_power),
-      cmocka_unit_test(texts_of_curves_are_read_back), cmocka_unit_test(other_texts_are_refused_with_what_is_allowed),
+      cmocka_unit_test(srgb_is_the_standards_curve),
+      cmocka_unit_test(curves_are_monotone_and_keep_black_and_white),
+      cmocka_unit_test(encoding_undoes_decoding),
+      cmocka_unit_test(gamma_is_a_power),
+      cmocka_unit_test(texts_of_curves_are_read_back),
+      cmocka_unit_test(other_texts_are_refused_with_what_is_allowed),
+      cmocka_unit_test(tables_follow_what_they_were_made_from),
+      cmocka_unit_test(tables_keep_their_order),
+      cmocka_unit_test(broken_tables_are_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -144,5 +144,44 @@ class Compensate(PathTest):
         self.assertEqual(both.stderr, "")
 
 
+class Optical(PathTest):
+    """compensate through a rig, whose room is a transport that h5py wrote."""
+
+    def setUp(self):
+        super().setUp()
+        self.dense = room(WIDTH, HEIGHT, 3, 0.5, 1).astype("f4")
+        write_transport(self.folder / "T.h5", self.dense, WIDTH, HEIGHT)
+        self.scene, self.picture = self.folder / "room.cfg", self.folder / "picture.npy"
+        self.scene.write_text('transport_file = "T.h5";\n')
+        self.words = ("--target", self.picture, "-o", self.folder / "drive.npy")
+
+    def test_few_photographs_make_a_picture_that_can_appear(self):
+        driven = 0.3 + 0.5 * smooth_picture(3)
+        target = appearance(self.dense, np.zeros((3, 1)), driven)
+        np.save(self.picture, target.reshape(3, HEIGHT, WIDTH).astype("f4"))
+        answer = answer_of("compensate", "--scene", self.scene, *self.words, "--white", 1)
+        drive = np.load(self.folder / "drive.npy")
+        self.assertTrue(drive.min() >= 0 and drive.max() <= 1)
+        seen = appearance(self.dense, 0.002, drive)
+        self.assertLess(relative_error(seen, target), 0.01)
+        self.assertLess(abs(answer["error_after"] - relative_error(seen, target)), 0.005)
+        self.assertEqual(answer["method"], "optical")
+        self.assertLessEqual(answer["photographs"], 20)
+        self.assertEqual(answer["photographs"], answer["iterations"] + 3)
+
+    def test_refuses_what_needs_a_transport(self):
+        np.save(self.picture, smooth_picture(3).astype("f4"))
+        for more, word in ((("--method", "pcg"), "--method"), (("--predict", self.folder / "s.png"), "--predict"),
+                           (("--white", "feasible"), "feasible"), (("--photographs", 3), "photographs"),
+                           (("--config", self.scene), "one of")):
+            done = run("compensate", "--scene", self.scene, *self.words, *more)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn(word, done.stderr)
+        done = run("compensate", *self.words)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("--scene", done.stderr)
+        self.assertFalse((self.folder / "drive.npy").exists())
+
+
 if __name__ == "__main__":
     main()

@@ -159,9 +159,9 @@ static void responses_are_undone(void **state) {
     for (int c = 0; c < 3; c++) {
       rig_bench bench;
       start_bench(&bench);
-      assert_ok(clt_curve_parse(curves[p], &bench.config.projector, &bench.error), bench.error);
+      assert_ok(clt_curve_parse(curves[p], &bench.world.projector_curve, &bench.error), bench.error);
       assert_ok(clt_curve_parse(curves[c], &bench.config.camera, &bench.error), bench.error);
-      bench.world.projector_curve = bench.config.projector;
+      bench.config.projector = clt_panel_of_curve(&bench.world.projector_curve);
       bench.world.camera_curve = bench.config.camera;
       open_bench(&bench);
       check_rounds(&bench, 2);

@@ -98,6 +98,58 @@ static void faults_by_chance(void **state) {
   }
 }
 
+/* Torn frames carry no light from some row on, a quarter to three quarters of them, and are whole above it. */
+static void torn_frames_are_dark_below(void **state) {
+  (void)state;
+  enum { FRAMES = 600, ROWS = 4 * WIDE_HEIGHT };
+  rig_pair pair = wide_open("", "cell_pixels = 4; vignetting = 0.01; faults = { torn = 0.2; };", "ambient = 0.5;");
+  int torn = 0, least = ROWS, most = 0;
+  for (int n = 0; n < FRAMES; n++) {
+    clt_frame frame = pair_frame(&pair, 0);
+    int lit = 0;
+    for (int y = 0; y < ROWS; y++) {
+      bool dark = frame.samples[y * frame.width * 3] == 0;
+      assert_true(dark || lit == y);
+      lit += !dark;
+    }
+    torn += lit < ROWS;
+    least = lit < least ? lit : least;
+    most = lit < ROWS && lit > most ? lit : most;
+  }
+  assert_near((double)torn / FRAMES, 0.2, 4.5 * sqrt(0.2 * 0.8 / FRAMES));
+  assert_true(least >= ROWS / 4 && least <= ROWS / 4 + 2 && most <= 3 * ROWS / 4 && most >= 3 * ROWS / 4 - 2);
+  pair_close(&pair);
+}
+
+/* The light of successive pictures is late by latency +- jitter, evenly: share of a frame that the new picture has. */
+static void latency_varies_by_chance(void **state) {
+  (void)state;
+  enum { PICTURES = 400 };
+  rig_pair pair = wide_open("latency_ms = 20.0; jitter_ms = 6.0; ", "fps = 100.0;", "ambient = 0.0;");
+  double sum = 0, square = 0, least = 1, most = 0;
+  pair_expose(&pair, 0.05);
+  for (int n = 0; n < PICTURES; n++) {
+    int64_t shown = pair_show(&pair, (float[WIDE_VALUES]){0});
+    pair_frame(&pair, shown + WIDE_SETTLED);
+    float codes[WIDE_VALUES];
+    wide_codes(codes);
+    double radiance[WIDE_VALUES];
+    wide_radiance(codes, radiance);
+    shown = pair_show(&pair, codes);
+    clt_frame frame = pair_frame(&pair, shown - 20000000);
+    double begin = 1e-9 * (double)(frame.exposed_ns - shown);
+    double late = begin + frame.exposure_s * (1 - wide_seen(&frame, 3) / radiance[3]);
+    sum += late / PICTURES;
+    square += late * late / PICTURES;
+    least = fmin(least, late);
+    most = fmax(most, late);
+  }
+  assert_near(sum, 0.02, 4.5 * 0.006 / sqrt(3.0 * PICTURES));
+  assert_near(sqrt(square - sum * sum), 0.006 / sqrt(3.0), 0.0003);
+  assert_true(least >= 0.014 - 1e-5 && least < 0.0145 && most <= 0.026 + 1e-5 && most > 0.0255);
+  pair_close(&pair);
+}
+
 static void stuck_frames_repeat(void **state) {
   (void)state;
   enum { FRAMES = 800 };
@@ -183,10 +235,11 @@ static void change_repaints_cells(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(flicker_is_integrated),   cmocka_unit_test(drift_dims_the_lamp),
-      cmocka_unit_test(rows_follow_each_other),  cmocka_unit_test(faults_by_chance),
-      cmocka_unit_test(stuck_frames_repeat),     cmocka_unit_test(late_frames_move_the_clock),
-      cmocka_unit_test(vibration_shifts_slopes), cmocka_unit_test(change_repaints_cells),
+      cmocka_unit_test(flicker_is_integrated),      cmocka_unit_test(drift_dims_the_lamp),
+      cmocka_unit_test(rows_follow_each_other),     cmocka_unit_test(faults_by_chance),
+      cmocka_unit_test(torn_frames_are_dark_below), cmocka_unit_test(latency_varies_by_chance),
+      cmocka_unit_test(stuck_frames_repeat),        cmocka_unit_test(late_frames_move_the_clock),
+      cmocka_unit_test(vibration_shifts_slopes),    cmocka_unit_test(change_repaints_cells),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,6 +13,8 @@ const char *__lsan_default_suppressions(void) {
 #define WALL_OF(corner, u, v, material)                                                                                \
   "surfaces = ( { corner = " corner "; u = " u "; v = " v "; material = \"" material "\"; } ); "
 
+#define TWO(one, other) "surfaces = ( { " one "; material = \"white\"; },\n { " other "; material = \"white\"; } ); "
+
 /* A scene that is refused, and the parts that its message must have. */
 typedef struct refusal {
   const char *text, *key, *why;
@@ -70,6 +72,12 @@ static const refusal refusals[] = {
     {GRID WHITE WALL_OF("[0, 0, 0]", "[1, 0, 0]", "[0, 0, 0]", "white"), "u", "longer than 1e-6"},
     {GRID WHITE WALL_OF("[0, 0, 0]", "[1, 0, 0]", "[0.0, 0.0, 1e9]", "white"), "v", "legal is -1000 to 1000"},
     {GRID WHITE WALL_OF("[0, 0, 0]", "[1, 0, 0]", "[0, 0, 1]", "withe"), "material", "\"withe\" is not among"},
+    {GRID WHITE TWO("corner = [-2, 0, -2]; u = [4, 0, 0]; v = [0, 0, 4]",
+                    "corner = [1, 0, 1]; u = [1, 0, 1]; v = [-1, 0, 1]"),
+     "scene.cfg:2: lies flush on a surface before it", "move it off"},
+    {GRID WHITE TWO("type = \"box\"; corner = [-1.0, 0.0, -1.5]; u = [1, 0, 0]; v = [0, 1, 0]; w = [0, 0, 1]",
+                    "type = \"box\"; corner = [-0.5, -0.5, -1.2]; u = [2, 0, 0]; v = [0, 2, 0]; w = [0.0, 0.0, 0.7]"),
+     "scene.cfg:2: lies flush", "cut out what it covers"},
     {GRID WHITE WALL_OF("[5, 0, 5]", "[1, 0, 0]", "[0, 0, 1]", "white"), "projector", "meets no surface"},
     {GRID WHITE WALL_OF("[-2, 0, -2]", "[0, 0, 4]", "[4, 0, 0]", "white"), "projector", "swap their u and v"},
     {"transport_file = \"absent.h5\";", "transport_file", "absent.h5"},
@@ -99,6 +107,33 @@ static void mistakes_are_refused(void **state) {
       fail_msg("%s\ngave %s: %s", refusals[k].text, clt_status_name(status), error.message);
     }
     assert_null(scene);
+  }
+}
+
+/* Surfaces that touch, share an edge or lie back to back are no mistake, however they are turned. */
+static void neighbours_are_read(void **state) {
+  static const char *const texts[] = {
+      TWO("corner = [-2, 0, -2]; u = [2, 0, 0]; v = [0, 0, 4]", "corner = [0, 0, -2]; u = [2, 0, 0]; v = [0, 0, 4]"),
+      TWO("corner = [-2, 0, -2]; u = [4, 0, 0]; v = [0, 0, 4]", "corner = [-2, 0, -2]; u = [0, 0, 4]; v = [4, 0, 0]"),
+      TWO("corner = [-2, 0, -2]; u = [4, 0, 0]; v = [0, 0, 4]",
+          "corner = [-1.0, -0.001, -1.0]; u = [2, 0, 0]; v = [0, 0, 2]"),
+      TWO("corner = [-1.0, 0.1, -1.0]; u = [0.7, 0.21, 0.0]; v = [0, 0, 1]",
+          "corner = [-0.3, 0.31, -1.0]; u = [0.07, 0.021, 0.0]; v = [0, 0, 1]"),
+      TWO("type = \"box\"; corner = [-1, 0, -1]; u = [1, 0, 0]; v = [0, 1, 0]; w = [0, 0, 1]",
+          "type = \"box\"; corner = [0, 0, -1]; u = [1, 0, 0]; v = [0, 1, 0]; w = [0, 0, 1]"),
+      TWO("corner = [-2, -2, -1]; u = [4, 0, 0]; v = [0, 4, 0]",
+          "type = \"box\"; corner = [0, 0, -1]; u = [1, 0, 0]; v = [0, 1, 0]; w = [0, 0, 1]; material = \"white\"; },"
+          "{ type = \"box\"; corner = [0.5, 0.5, -1.0]; u = [1, 0, 0]; v = [0, 1, 0]; w = [0.0, 0.0, 0.7]"),
+      TWO("type = \"cylinder\"; centre = [0, 0, -1]; axis = [0.0, 0.1, 2.0]; start = [1, 0, 0]; pieces = 7",
+          "type = \"sphere\"; centre = [0.0, -1.5, 0.0]; radius = 0.3")};
+  (void)state;
+  for (size_t k = 0; k < sizeof texts / sizeof texts[0]; k++) {
+    char text[1024];
+    room made;
+    snprintf(text, sizeof text, "%s%s", GRID WHITE, texts[k]);
+    room_make(&made, text);
+    clt_scene_close(room_open(&made));
+    room_remove(&made);
   }
 }
 
@@ -259,9 +294,10 @@ static void channels_are_independent(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(mistakes_are_refused),     cmocka_unit_test(damaged_files), cmocka_unit_test(absent_file),
-      cmocka_unit_test(shipped_scenes),           cmocka_unit_test(defaults),      cmocka_unit_test(transport_alone),
-      cmocka_unit_test(channels_are_independent),
+      cmocka_unit_test(mistakes_are_refused), cmocka_unit_test(neighbours_are_read),
+      cmocka_unit_test(damaged_files),        cmocka_unit_test(absent_file),
+      cmocka_unit_test(shipped_scenes),       cmocka_unit_test(defaults),
+      cmocka_unit_test(transport_alone),      cmocka_unit_test(channels_are_independent),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

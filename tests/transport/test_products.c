@@ -159,8 +159,8 @@ static void test_zero_rows(void **unused) {
   finish_known(&known);
 }
 
-/* Case 19 of NUMERICS section 8: sums of 131072 terms to 1e-6, with cancellation to a thousandth. */
-static void test_long_sums(void **unused) {
+/* Sums of 131072 terms to 1e-6, with cancellation to a thousandth. */
+static void case_19_sums_of_131072_terms(void **unused) {
   (void)unused;
   enum { COLS = 131072, ROWS = 6 };
   clt_transport *transport;
@@ -201,6 +201,6 @@ static void test_long_sums(void **unused) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_products), cmocka_unit_test(test_thread_count),
-                                     cmocka_unit_test(test_zero_rows), cmocka_unit_test(test_long_sums)};
+                                     cmocka_unit_test(test_zero_rows), cmocka_unit_test(case_19_sums_of_131072_terms)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -239,9 +239,8 @@ static void test_byte_variants(void **unused) {
   assert_true(clt_byte_choose()->runs_here());
 }
 
-/* Case 18 of NUMERICS section 8: units in which fp16 alone would go subnormal or overflow change nothing but the unit.
- */
-static void test_units(void **unused) {
+/* Units in which fp16 alone would go subnormal or overflow change nothing but the unit. */
+static void case_18_fp16_subnormal_and_overflow(void **unused) {
   (void)unused;
   static const float units[] = {0x1p-60f, 0x1p-100f, 0x1p60f, 0x1p90f};
   const size_case size = {33, 17, 1, 561};
@@ -360,8 +359,8 @@ static void test_from_tree(void **unused) {
   finish_known(&known);
 }
 
-/* Case 19: sums of 131072 terms to 1e-6 of what the storage holds, forward and backward. */
-static void test_long_sums(void **unused) {
+/* Sums of 131072 terms to 1e-6 of what the storage holds, forward and backward. */
+static void case_19_sums_of_131072_terms(void **unused) {
   (void)unused;
   enum { COLS = 131072, ROWS = 3 };
   clt_transport *row, *column;
@@ -465,10 +464,17 @@ static void test_compensation(void **unused) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_entries),       cmocka_unit_test(test_products),       cmocka_unit_test(test_thread_count),
-      cmocka_unit_test(test_half_variants), cmocka_unit_test(test_plain_variants), cmocka_unit_test(test_byte_variants),
-      cmocka_unit_test(test_units),         cmocka_unit_test(test_half_codes),     cmocka_unit_test(test_refusals),
-      cmocka_unit_test(test_from_tree),     cmocka_unit_test(test_long_sums),      cmocka_unit_test(test_compensation)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_entries),
+                                     cmocka_unit_test(test_products),
+                                     cmocka_unit_test(test_thread_count),
+                                     cmocka_unit_test(test_half_variants),
+                                     cmocka_unit_test(test_plain_variants),
+                                     cmocka_unit_test(test_byte_variants),
+                                     cmocka_unit_test(case_18_fp16_subnormal_and_overflow),
+                                     cmocka_unit_test(test_half_codes),
+                                     cmocka_unit_test(test_refusals),
+                                     cmocka_unit_test(test_from_tree),
+                                     cmocka_unit_test(case_19_sums_of_131072_terms),
+                                     cmocka_unit_test(test_compensation)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

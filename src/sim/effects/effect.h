@@ -57,6 +57,7 @@ typedef struct clt_row {
 typedef struct clt_fate {
   bool dropped;    /* never arrives */
   bool stuck;      /* carries the samples of the frame before */
+  double dark;     /* share of its rows, from the bottom up, that carry no light */
   int64_t late_ns; /* arrives that long after its exposure */
 } clt_fate;
 

@@ -1,5 +1,5 @@
-/* What goes wrong between camera and program: frames that never arrive, that carry the samples of the frame before, or
- * that arrive late. Each by chance, a function of the seed and the frame's number. */
+/* What goes wrong between camera and program: frames that never arrive, that carry the samples of the frame before,
+ * that arrive late, or whose lower rows are dark. Each by chance, a function of the seed and the frame's number. */
 #include <stdio.h>
 
 #include "sim/noise.h"
@@ -13,6 +13,7 @@ static void read(clt_section root, clt_scene_description *description) {
   description->effects.faults = (clt_faults_description){
       .dropped = clt_read_number(section, "dropped", 0.0, 0.0, 0.9),
       .stuck = clt_read_number(section, "stuck", 0.0, 0.0, 0.9),
+      .torn = clt_read_number(section, "torn", 0.0, 0.0, 0.9),
       .late = clt_read_number(section, "late", 0.0, 0.0, 1.0),
       .late_s = 1e-3 * clt_read_number(section, "late_ms", 50.0, 0.0, 10000.0),
   };
@@ -20,11 +21,13 @@ static void read(clt_section root, clt_scene_description *description) {
 
 static bool called_for(const clt_scene *scene, char *why) {
   const clt_faults_description *faults = &scene->description.effects.faults;
-  bool on = faults->dropped > 0.0 || faults->stuck > 0.0 || (faults->late > 0.0 && faults->late_s > 0.0);
+  bool on = faults->dropped > 0.0 || faults->stuck > 0.0 || faults->torn > 0.0 ||
+            (faults->late > 0.0 && faults->late_s > 0.0);
   snprintf(why, CLT_EFFECT_WHY_MAX,
-           on ? "of 100 frames %.3g are dropped, %.3g stuck at the one before, %.3g late by %.4g ms"
+           on ? "of 100 frames %.3g are dropped, %.3g stuck at the one before, %.3g dark below, %.3g late by %.4g ms"
               : "every frame arrives, in time",
-           100.0 * faults->dropped, 100.0 * faults->stuck, 100.0 * faults->late, 1e3 * faults->late_s);
+           100.0 * faults->dropped, 100.0 * faults->stuck, 100.0 * faults->torn, 100.0 * faults->late,
+           1e3 * faults->late_s);
   return on;
 }
 
@@ -34,6 +37,7 @@ static void frame(const void *state, uint32_t sequence, clt_fate *fate) {
   uint64_t key = clt_noise_key(description->seed + OTHER_SEEDS, sequence);
   fate->dropped = clt_noise_uniform(key, 0) < faults->dropped;
   fate->stuck = clt_noise_uniform(key, 1) < faults->stuck;
+  fate->dark = clt_noise_uniform(key, 3) < faults->torn ? 0.25 + 0.5 * clt_noise_uniform(key, 4) : 0.0;
   fate->late_ns = clt_noise_uniform(key, 2) < faults->late ? llround(1e9 * faults->late_s) : 0;
 }
 

@@ -231,7 +231,7 @@ static double slope(const clt_chart_line *line) {
 typedef struct ladder {
   clt_chart chart;
   const char *best_method;
-  outcome series, iterative, single, wavelet, best; /* of the last rung; single: the iteration on T in float */
+  outcome series, iterative, twice, wavelet, best; /* of the last rung; twice: the iteration on T in double */
 } ladder;
 
 static clt_status climb(const clt_reproduce_options *options, ladder *on, const struct rung *rung, clt_error *error) {
@@ -247,10 +247,10 @@ static clt_status climb(const clt_reproduce_options *options, ladder *on, const 
     status = clt_figure_step(options, error, "Fig. 10, N = %d: iterations", rung->cells);
   }
   if (status == CLT_OK) {
-    status = run_method(&of, of.exact, "jacobi", of.start, LONG_S, &on->iterative, error);
+    status = run_method(&of, of.exact, "jacobi", of.start, LONG_S, &on->twice, error);
   }
   if (status == CLT_OK) {
-    status = run_method(&of, of.transport, "jacobi", of.start, LONG_S, &on->single, error);
+    status = run_method(&of, of.transport, "jacobi", of.start, LONG_S, &on->iterative, error);
   }
   if (status == CLT_OK) {
     status = run_method(&of, of.transport, "wavelet", NULL, LONG_S, &on->wavelet, error);
@@ -282,9 +282,9 @@ static void judge(const ladder *on, const struct rung *last, clt_reproduction *o
   snprintf(text, sizeof text, "wavelets are %.3g times as fast as the iteration at N = %d",
            last->iterative / last->wavelet, last->cells);
   clt_reproduced_add(out, "Fig. 10, wavelet", text, wavelet >= last->iterative / last->wavelet,
-                     "%.3g times (%.3g ms to %.2g %%; made ready in %.3g s); %.3g times the iteration on T in single",
+                     "%.3g times (%.3g ms to %.2g %%; made ready in %.3g s); %.3g times the iteration on T in double",
                      wavelet, on->wavelet.ms, 100 * on->wavelet.error, on->wavelet.prepare_s,
-                     on->single.ms / on->wavelet.ms);
+                     on->twice.ms / on->wavelet.ms);
   snprintf(text, sizeof text, "its best, the wavelets, takes %.3g ms at N = %d", last->wavelet * REPORT_UNIT_MS,
            last->cells);
   clt_reproduced_add(out, "Fig. 10, best", text,
@@ -297,8 +297,9 @@ static void judge(const ladder *on, const struct rung *last, clt_reproduction *o
   snprintf(text, sizeof text, "the iteration is %.0f times as fast as the series at N = %d",
            last->series / last->iterative, last->cells);
   clt_reproduced_add(out, "Fig. 10, iteration", text, series >= 1000.0,
-                     "%.0f times (%.3g ms against %.3g s, both in double to %.1f %%; %.3g ms on T in single)", series,
-                     on->iterative.ms, 1e-3 * on->series.ms, 100 * WANTED, on->single.ms);
+                     "%.0f times (%.3g ms against %.3g s, both to %.1f %%); %.0f times on T in double (%.3g ms)",
+                     series, on->iterative.ms, 1e-3 * on->series.ms, 100 * WANTED, on->series.ms / on->twice.ms,
+                     on->twice.ms);
   clt_reproduced_add(out, "Fig. 10, growth", "N^3, N^2, about N",
                      steep[0] > 2.5 && steep[0] < 3.3 && steep[1] > 1.6 && steep[1] < 2.5 && steep[2] < 1.5,
                      "N^%.2f, N^%.2f, N^%.2f over the last three sizes; taken for it: 2.5..3.3, 1.6..2.5, below 1.5",
@@ -333,9 +334,10 @@ static clt_status compute(const clt_reproduce_options *options, clt_reproduction
 const clt_figure clt_figure_ladder = {
     .name = "Fig. 10",
     .caption = "Series, iteration and wavelets as the transport grows, all to an error of 1 %, beside the report's "
-               "times (Matlab, 2010) and the best method here. The series (dgemm) and the iteration (T in double) "
-               "compute as the report's Matlab does; the wavelets keep their coefficients in single precision. Making "
-               "a method ready is not counted, as there. What else runs on the machine weighs on the iteration, which "
+               "times (Matlab, 2010) and the best method here. The series (dgemm) computes in double as the "
+               "report's Matlab does; the iteration and the wavelets read T and its coefficients in single precision, "
+               "as this library stores them, and add in double. Making a method ready is not counted, as there. What "
+               "else runs on the machine weighs on the iteration, which "
                "reads all of T at every step.",
     .files = {{"fig10.svg", "Time to 1 %, lines of this machine solid, the report's dashed.", true}},
     .compute = compute};
