@@ -72,6 +72,7 @@ static void read_acquire(clt_section section, clt_station_config *config) {
   acquire->seconds = clt_read_number(section, "seconds", 0, 0, 1e9);
   acquire->repeats = clt_read_integer(section, "repeats", 0, 1, 256);
   acquire->checks = clt_read_integer(section, "checks", 2, 0, 64);
+  acquire->watch = clt_read_integer(section, "watch", 0, 0, 1000000);
   acquire->seed = (unsigned)clt_read_integer(section, "seed", 0, 0, 1000000000);
 }
 
