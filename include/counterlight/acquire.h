@@ -31,11 +31,17 @@ typedef struct clt_acquire_options {
   int checks;         /* random check patterns observed at the end for provenance.error, 0..64 */
   unsigned seed;      /* of the check patterns */
   const char
-      *journal; /* NULL, or a file in which every observation is kept as soon as it is made. Where it is there
-                   already, from an acquisition that was interrupted, its observations are taken instead of new
-                   ones as long as the same patterns are asked for. It stays: remove it when the transport is
-                   stored, or the next acquisition gives that one again. CLT_BAD_INPUT where it is another rig's */
-  /* Called after every pattern; returning false cancels (CLT_CANCELLED). May be NULL. */
+      *journal;      /* NULL, or a file in which every observation is kept as soon as it is made. Where it is there
+                        already, from an acquisition that was interrupted, its observations are taken instead of new
+                        ones as long as the same patterns are asked for. It stays: remove it when the transport is
+                        stored, or the next acquisition gives that one again. CLT_BAD_INPUT where it is another rig's */
+  int watch;         /* patterns between two looks at the white picture, 0..1000000: where it is not as it was, what was
+                        observed since the last look is observed again once it is. Also waits for a device that is gone or gives
+                        no frame. 0: looks never and waits for nothing */
+  double patience_s; /* to wait for either, >= 0; 0 means 30. Then CLT_FAILED says where the room changed and by how
+                        much, or the rig's own status says what is missing */
+  /* Called after every pattern, and with phase "waiting" while a device is waited for; returning false cancels
+   * (CLT_CANCELLED). May be NULL. */
   bool (*progress)(void *context, const clt_progress *progress);
   void *context;
 } clt_acquire_options;

@@ -36,6 +36,14 @@ CLT_PUBLIC clt_status clt_panel_set_crosstalk(clt_panel *panel, const double lig
  */
 CLT_PUBLIC void clt_panel_encode(const clt_panel *panel, const clt_image *drive, int channels, int height, int width,
                                  float *codes);
+/* The light that a panel sends out for codes (0..1, clipped; 1 or 3 channels, as many as the panel has): what
+ * clt_panel_encode undoes. light is initialised here. */
+CLT_PUBLIC clt_status clt_panel_decode(const clt_panel *panel, const clt_image *codes, clt_image *light,
+                                       clt_error *error);
+/* Writes a drive: .png and .jpg hold the codes that show it (8 bit), .exr and .npy its linear light. As
+ * clt_image_write. */
+CLT_PUBLIC clt_status clt_panel_write(const char *path, const clt_panel *panel, const clt_image *drive,
+                                      clt_error *error);
 
 #ifdef __cplusplus
 }

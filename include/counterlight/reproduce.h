@@ -29,7 +29,7 @@ typedef struct clt_reproduce_options {
   const char *folder; /* that exists, where .csv, .png, .svg and reproduce.html go */
   const char *scenes; /* folder of the scenes that come with counterlight; Figs. 9, 12 and 13 are of them */
   int largest;        /* cells of the largest rung of Fig. 10's ladder: 80, 320, 1280, 5120 or 10240; 0: 10240, which
-                         takes minutes and 4 GB */
+                         takes minutes and 5 GB */
   /* Told before each part begins, `done` of `parts` being done; false stops (CLT_CANCELLED). NULL: nobody is told. */
   bool (*progress)(void *context, const char *part, int done, int parts);
   void *context;

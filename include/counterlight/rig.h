@@ -28,7 +28,7 @@ typedef struct clt_rig_operations {
    * caller to the grid's size. Values may be slightly negative (noise is not clipped). A cell without one valid sample
    * (saturated in every exposure, not seen, or contradicted by other exposures at every attempt) has an infinite
    * deviation. Blocks; tries again by itself as configured; CLT_TIMEOUT, CLT_GONE or CLT_FAILED when that did not help:
-   * where frames are proven to be of another picture, the message has their numbers. */
+   * where frames are proven to be of another picture, CLT_TIMEOUT with their numbers. */
   clt_status (*observe)(clt_rig *rig, const clt_image *drive, clt_image *radiance, clt_image *deviation,
                         clt_error *error);
   void (*close)(clt_rig *rig); /* frees the rig, not its devices; accepts NULL */

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 
 #include "counterlight/acquire.h"
+#include "counterlight/calibration.h"
 #include "counterlight/rig.h"
 #include "counterlight/scene.h"
 #include "counterlight/status.h"
@@ -18,12 +19,16 @@ typedef struct clt_station_config {
   char scene[CLT_PATH_MAX]; /* scene file for simulated devices, resolved against the configuration's folder; or "" */
   char projector[32];       /* driver names: "simulated" */
   char camera[32];
+  char calibration[CLT_PATH_MAX]; /* calibration file, resolved likewise; or "" */
+  char replay[CLT_PATH_MAX];      /* recording that stands for both devices, resolved likewise; or "" */
+  char record[CLT_PATH_MAX];      /* folder in which every frame is kept; or "". Not of the file */
   /* What is 0 (sizes, exposure count, timeout, attempts), negative (latency) or not given (the curves) is filled from
-   * the scene when the rig is opened. */
+   * the calibration, or else from the scene, when the rig is opened. */
   clt_rig_config rig;
   bool projector_response_given, camera_response_given; /* rig.projector, rig.camera come from the file */
-  char scheme[24];                                      /* of the acquisition: "auto", "brute", "hadamard", "hierarchical", "blocks" */
-  clt_acquire_options acquire;                          /* scheme, progress and context are left to the caller */
+  bool verify_given;                                    /* and rig.verify; if not, it is true without a calibration */
+  char scheme[24];             /* of the acquisition: "auto", "brute", "hadamard", "hierarchical", "blocks" */
+  clt_acquire_options acquire; /* scheme, progress and context are left to the caller */
 } clt_station_config;
 
 /* The settings that fit a scene file alone: simulated devices and the rig that suits them. */
@@ -32,19 +37,25 @@ CLT_PUBLIC clt_status clt_station_for_scene(const char *scene_path, clt_station_
 CLT_PUBLIC clt_status clt_station_read(const char *path, clt_station_config *config, clt_error *error);
 
 typedef struct clt_station {
-  clt_scene *scene; /* NULL where the devices are real */
+  clt_scene *scene;             /* NULL where the devices are real */
+  clt_calibration *calibration; /* NULL where there is none; one that the caller puts here becomes the station's */
   clt_projector *projector;
   clt_camera *camera;
-  clt_rig *rig; /* NULL until clt_station_open_rig */
+  clt_rig *rig;                      /* NULL until clt_station_open_rig */
+  clt_projector *recorded_projector; /* the devices themselves where projector and camera record them */
+  clt_camera *recorded_camera;
 } clt_station;
 
-/* Opens the devices that config names. */
+/* Opens the devices that config names, and loads its calibration. Of config.replay the frames are served and no device
+ * is opened; a scene then gives no more than the rig's settings. */
 CLT_PUBLIC clt_status clt_station_open(const clt_station_config *config, clt_station *station, clt_error *error);
+/* The rig's settings: what the file says, where it says nothing the station's calibration, then the scene. */
+CLT_PUBLIC clt_rig_config clt_station_rig_config(const clt_station_config *config, const clt_station *station);
 /* Makes the rig on the station's camera and on `projector`, NULL meaning the station's own (a daemon that presents from
  * its own thread hands in a stand-in, which must outlive the rig). */
 CLT_PUBLIC clt_status clt_station_open_rig(const clt_station_config *config, clt_station *station,
                                            clt_projector *projector, clt_error *error);
-/* Closes rig, devices and scene in that order; accepts a zeroed station and NULL. */
+/* Closes rig, devices, scene and calibration in that order; accepts a zeroed station and NULL. */
 CLT_PUBLIC void clt_station_close(clt_station *station);
 
 #ifdef __cplusplus

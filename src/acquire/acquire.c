@@ -15,7 +15,7 @@
 #define THRESHOLD_MAX 0.5
 #define ERROR_DEFAULT 0.005
 #define ERROR_MAX 0.5
-enum { CHECKS_MAX = 64 };
+enum { CHECKS_MAX = 64, WATCH_MAX = 1000000 };
 
 static clt_status check_options(const clt_acquire_options *options, clt_acquire_options *checked, clt_error *error) {
   *checked = *options;
@@ -35,6 +35,11 @@ static clt_status check_options(const clt_acquire_options *options, clt_acquire_
         "the wanted error is %g, the seconds allowed are %g; legal is 0 (the default) to %g, and 0 (no limit) "
         "or more",
         options->error, options->seconds, ERROR_MAX);
+  }
+  if (options->watch < 0 || options->watch > WATCH_MAX || !(options->patience_s >= 0)) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "watch is %d, patience %g s; legal is 0 (off) to %d, and 0 (the default) or more", options->watch,
+                    options->patience_s, WATCH_MAX);
   }
   checked->error = options->error > 0 ? options->error : ERROR_DEFAULT;
   checked->threshold = options->threshold > 0 ? options->threshold : THRESHOLD_DEFAULT;
@@ -73,7 +78,7 @@ static void write_provenance(const clt_session *session, const clt_scheme *schem
   session->rig->operations->describe(session->rig, &now);
   clt_provenance *origin = clt_transport_provenance(transport);
   *origin = (clt_provenance){.acquired = (int64_t)time(NULL),
-                             .patterns = (int)session->progress.done,
+                             .patterns = (int)(session->progress.done + session->watch.dropped),
                              .frames = (int)(now.frames - session->info.frames),
                              .seconds = clt_clock_since(session->started_ns),
                              .error = error};
@@ -83,16 +88,49 @@ static void write_provenance(const clt_session *session, const clt_scheme *schem
   snprintf(origin->response, sizeof origin->response, "%s", now.response != NULL ? now.response : "");
 }
 
+/* One pass, which the watch may break off. */
+static clt_status measure_once(clt_session *session, const clt_scheme *scheme, clt_transport **out, clt_error *error) {
+  clt_transport *transport = NULL;
+  clt_status status = measure_black_and_flood(session, error);
+  if (status == CLT_OK) {
+    clt_session_watch(session);
+    status = scheme->measure(session, &transport, error);
+  }
+  if (status == CLT_OK) {
+    status = clt_session_look(session, error);
+  }
+  if (status != CLT_OK) {
+    clt_transport_destroy(transport);
+    return status;
+  }
+  session->watch.ready = false;
+  *out = transport;
+  return CLT_OK;
+}
+
+/* Passes until the watch is content; all but the first take from the journal what was good. */
+static clt_status measure(clt_session *session, const clt_scheme *scheme, clt_transport **out, clt_error *error) {
+  clt_session_mark_start(session);
+  for (;;) {
+    bool again = false;
+    clt_status status = measure_once(session, scheme, out, error);
+    if (status == CLT_OK) {
+      return status;
+    }
+    clt_status back = clt_session_begin_again(session, &again, error);
+    if (back != CLT_OK || !again) {
+      return back != CLT_OK ? back : status;
+    }
+  }
+}
+
 static clt_status acquire(clt_session *session, const clt_scheme *scheme, clt_transport **out, clt_error *error) {
   const clt_acquire_options *options = &session->options;
   session->progress.total =
       session->progress.done + 2L * options->repeats + scheme->patterns(session) + options->checks;
   clt_transport *transport = NULL;
   double relative = -1;
-  clt_status status = measure_black_and_flood(session, error);
-  if (status == CLT_OK) {
-    status = scheme->measure(session, &transport, error);
-  }
+  clt_status status = measure(session, scheme, &transport, error);
   if (status == CLT_OK) {
     status = write_black_and_flood(session, transport, error);
   }

@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -113,6 +114,16 @@ clt_status clt_journal_open(clt_journal *journal, const char *path, const clt_ri
   return read_head(journal, info, error);
 }
 
+clt_status clt_journal_open_unnamed(clt_journal *journal, clt_error *error) {
+  *journal = (clt_journal){.file = -1, .unnamed = true, .path = "in a temporary file"};
+  FILE *file = tmpfile();
+  if (file != NULL) {
+    journal->file = fcntl(fileno(file), F_DUPFD_CLOEXEC, 0);
+    fclose(file);
+  }
+  return journal->file >= 0 ? CLT_OK : fail(journal, "could not open", error);
+}
+
 void clt_journal_close(clt_journal *journal) {
   if (journal->path != NULL && journal->file >= 0) {
     close(journal->file);
@@ -156,7 +167,19 @@ clt_status clt_journal_add(clt_journal *journal, const clt_image *drive, const c
                        .bytes = bytes,
                        .sum = hash_image(hash_image(HASH_START, seen), deviation)};
   return write_whole(journal->file, &next, sizeof next) && write_whole(journal->file, seen->data, bytes) &&
-                 write_whole(journal->file, deviation->data, bytes) && fdatasync(journal->file) == 0
+                 write_whole(journal->file, deviation->data, bytes) &&
+                 (journal->unnamed || fdatasync(journal->file) == 0)
              ? CLT_OK
              : fail(journal, "could not write", error);
+}
+
+off_t clt_journal_here(const clt_journal *journal) {
+  return journal->file >= 0 ? lseek(journal->file, 0, SEEK_CUR) : 0;
+}
+
+clt_status clt_journal_go_back(clt_journal *journal, off_t start, off_t end, clt_error *error) {
+  journal->replaying = true;
+  return ftruncate(journal->file, end) == 0 && lseek(journal->file, start, SEEK_SET) == start
+             ? CLT_OK
+             : fail(journal, "could not go back in", error);
 }

@@ -7,6 +7,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include <sys/types.h>
 
 #include "counterlight/image.h"
 #include "counterlight/rig.h"
@@ -14,13 +15,15 @@
 
 typedef struct clt_journal {
   int file; /* -1: none is kept */
-  bool replaying;
-  const char *path; /* not owned */
+  bool replaying, unnamed;
+  const char *path; /* not owned; of an unnamed one, for messages */
 } clt_journal;
 
 /* Opens or begins the journal at path (NULL: none). It belongs to a rig's source, grid, channels and response:
  * CLT_BAD_INPUT where the file is one of another rig, or no journal. */
 clt_status clt_journal_open(clt_journal *journal, const char *path, const clt_rig_info *info, clt_error *error);
+/* One without a name, gone when it is closed, to begin an acquisition again from within. */
+clt_status clt_journal_open_unnamed(clt_journal *journal, clt_error *error);
 void clt_journal_close(clt_journal *journal);
 
 /* The next record, if it is of this drive: seen and deviation are filled, *found is true. Otherwise the records from
@@ -30,5 +33,10 @@ clt_status clt_journal_replay(clt_journal *journal, const clt_image *drive, clt_
 /* Appends an observation and brings it to the disk. */
 clt_status clt_journal_add(clt_journal *journal, const clt_image *drive, const clt_image *seen,
                            const clt_image *deviation, clt_error *error);
+
+/* Where the next record is read or written; 0 without a journal. */
+off_t clt_journal_here(const clt_journal *journal);
+/* Drops the records from `end` on, and replays from `start`. */
+clt_status clt_journal_go_back(clt_journal *journal, off_t start, off_t end, clt_error *error);
 
 #endif

@@ -1,8 +1,23 @@
 #include "acquire/session.h"
 
 #include <math.h>
+#include <string.h>
+#include <time.h>
 
 #include "base/clock.h"
+
+/* Between two tries at a device that fails. */
+#define PAUSE_FIRST_S 0.01
+#define PAUSE_LAST_S 1.0
+/* Part of its light by which a tile of the white picture may differ: lamps and mains are not steadier than that. The
+ * black picture is mostly the room's own light, which flickers. */
+#define STEADY 0.01
+#define STEADY_BLACK 0.3
+/* The same of single cells, whose edges may shake, and the share of cells that may go wrong as defective pixels do. */
+#define STEADY_CELL 0.1
+#define DOUBTFUL_SHARE 0.01
+/* Disturbances after which it is no use to begin again. */
+enum { PASSES_MAX = 100 };
 
 clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquire_options *options, clt_error *error) {
   *session = (clt_session){.rig = rig, .options = *options, .started_ns = clt_clock_ns()};
@@ -15,11 +30,16 @@ clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquir
   for (size_t i = 0; status == CLT_OK && i < sizeof images / sizeof images[0]; i++) {
     status = clt_image_init(images[i], info->channels, info->height, info->width, error);
   }
+  status = status == CLT_OK ? clt_watch_init(&session->watch, options, info, error) : status;
+  if (status == CLT_OK && options->journal == NULL && options->watch > 0) {
+    return clt_journal_open_unnamed(&session->journal, error);
+  }
   return status == CLT_OK ? clt_journal_open(&session->journal, options->journal, info, error) : status;
 }
 
 void clt_session_finish(clt_session *session) {
   clt_journal_close(&session->journal);
+  clt_watch_finish(&session->watch);
   clt_image_finish(&session->drive);
   clt_image_finish(&session->seen);
   clt_image_finish(&session->deviation);
@@ -36,6 +56,56 @@ void clt_session_fill(clt_session *session, float value) {
   }
 }
 
+static clt_status report(clt_session *session, const char *phase, clt_error *error) {
+  clt_progress *progress = &session->progress;
+  progress->phase = phase;
+  progress->seconds = clt_clock_since(session->started_ns);
+  if (session->options.progress != NULL && !session->options.progress(session->options.context, progress)) {
+    return clt_fail(error, CLT_CANCELLED, "the acquisition was cancelled after %ld patterns", progress->done);
+  }
+  return CLT_OK;
+}
+
+static clt_status observe_possible(clt_session *session, clt_error *error) {
+  const clt_watch *watch = &session->watch;
+  clt_status status =
+      session->rig->operations->observe(session->rig, &session->drive, &session->seen, &session->deviation, error);
+  if (status != CLT_OK || !watch->ready) {
+    return status;
+  }
+  double share =
+      clt_watch_impossible(&watch->expected, &watch->variance, &session->seen, &session->deviation, STEADY_CELL);
+  return share <= DOUBTFUL_SHARE
+             ? CLT_OK
+             : clt_fail(error, CLT_TIMEOUT,
+                        "%.2g %% of the cells are brighter than under the white picture, or saturated: another light "
+                        "is on, or the frames are not of their picture",
+                        100 * share);
+}
+
+/* By the rig, however often it takes: a device that does not answer, or is gone, may come back. */
+static clt_status observe_patiently(clt_session *session, clt_error *error) {
+  clt_watch *watch = &session->watch;
+  const int64_t started_ns = clt_clock_ns();
+  double pause_s = PAUSE_FIRST_S;
+  for (int tries = 1;; tries++) {
+    clt_status status = observe_possible(session, error);
+    if (watch->every == 0 || (status != CLT_TIMEOUT && status != CLT_GONE)) {
+      return status;
+    }
+    watch->troubled = true;
+    if (clt_clock_since(started_ns) >= watch->patience_s) {
+      return clt_fail_within(error, "tried %d times in %.3g s: ", tries, clt_clock_since(started_ns));
+    }
+    status = report(session, "waiting", error);
+    if (status != CLT_OK) {
+      return status;
+    }
+    nanosleep(&(struct timespec){.tv_sec = (time_t)pause_s, .tv_nsec = (long)(1e9 * fmod(pause_s, 1))}, NULL);
+    pause_s = fmin(2 * pause_s, PAUSE_LAST_S);
+  }
+}
+
 /* From the journal, or from the rig and into the journal. */
 static clt_status observe(clt_session *session, clt_error *error) {
   clt_image *drive = &session->drive, *seen = &session->seen, *deviation = &session->deviation;
@@ -45,54 +115,189 @@ static clt_status observe(clt_session *session, clt_error *error) {
     session->progress.resumed += found;
     return status;
   }
-  status = session->rig->operations->observe(session->rig, drive, seen, deviation, error);
+  status = observe_patiently(session, error);
   return status == CLT_OK ? clt_journal_add(&session->journal, drive, seen, deviation, error) : status;
 }
 
-clt_status clt_session_observe(clt_session *session, const char *phase, clt_error *error) {
+/* Observes and counts the drive. */
+static clt_status observe_one(clt_session *session, const char *phase, clt_error *error) {
   clt_progress *progress = &session->progress;
   clt_status status = observe(session, error);
+  if (status == CLT_CANCELLED) {
+    return status;
+  }
   if (status != CLT_OK) {
     return clt_fail_within(error, "acquiring (%s, pattern %ld): ", phase, progress->done + 1);
   }
-  progress->phase = phase;
   progress->done++;
   progress->total = progress->done > progress->total ? progress->done : progress->total;
   progress->seconds = clt_clock_since(session->started_ns);
   progress->left = progress->seconds / (double)progress->done * (double)(progress->total - progress->done);
-  if (session->options.progress != NULL && !session->options.progress(session->options.context, progress)) {
-    return clt_fail(error, CLT_CANCELLED, "the acquisition was cancelled after %ld patterns", progress->done);
+  return report(session, phase, error);
+}
+
+clt_status clt_session_observe(clt_session *session, const char *phase, clt_error *error) {
+  clt_watch *watch = &session->watch;
+  clt_status status = CLT_OK;
+  if (watch->ready && watch->since >= watch->every) {
+    status = clt_session_look(session, error);
+  }
+  watch->since++;
+  return status == CLT_OK ? observe_one(session, phase, error) : status;
+}
+
+void clt_session_mark_start(clt_session *session) {
+  clt_watch *watch = &session->watch;
+  watch->start = watch->good = clt_journal_here(&session->journal);
+  watch->start_done = watch->good_done = session->progress.done;
+}
+
+static void mark_good(clt_session *session) {
+  clt_watch *watch = &session->watch;
+  watch->good = clt_journal_here(&session->journal);
+  watch->good_done = session->progress.done;
+  watch->since = 0;
+  watch->troubled = false;
+}
+
+void clt_session_watch(clt_session *session) {
+  clt_watch *watch = &session->watch;
+  if (watch->every == 0) {
+    return;
+  }
+  size_t values = clt_image_size(&session->flood);
+  for (size_t i = 0; i < values; i++) {
+    watch->expected.data[i] = session->flood.data[i] + session->black.data[i];
+    watch->variance.data[i] = session->flood_variance.data[i];
+  }
+  watch->ready = true;
+  mark_good(session);
+}
+
+clt_status clt_session_begin_again(clt_session *session, bool *again, clt_error *error) {
+  clt_watch *watch = &session->watch;
+  *again = watch->again;
+  if (!watch->again) {
+    return CLT_OK;
+  }
+  watch->dropped += session->progress.done - watch->good_done;
+  session->progress.done = watch->start_done;
+  watch->again = watch->ready = false;
+  return clt_journal_go_back(&session->journal, watch->start, watch->good, error);
+}
+
+static clt_status fail_changed(const clt_session *session, const clt_change *change, int looks, clt_error *error) {
+  const clt_watch *watch = &session->watch;
+  char what[160];
+  clt_change_format(change, what, sizeof what);
+  return clt_fail(error, CLT_FAILED,
+                  "the room changed while it was measured: %s since pattern %ld, in each of %d looks during %.3g s; "
+                  "keep people and lights out of it, let the lamp warm up, and measure again",
+                  what, watch->good_done, looks, watch->patience_s);
+}
+
+/* Looks until white is what it was. */
+static clt_status look_until_same(clt_session *session, int *looks, clt_error *error) {
+  const clt_watch *watch = &session->watch;
+  const int64_t started_ns = clt_clock_ns();
+  clt_session_fill(session, 1);
+  for (*looks = 1;; ++*looks) {
+    clt_status status = observe_one(session, "look", error);
+    if (status != CLT_OK) {
+      return status;
+    }
+    clt_change change =
+        clt_watch_compare(&watch->expected, &watch->variance, &session->seen, &session->deviation, STEADY);
+    if (!(change.share > 0)) {
+      return CLT_OK;
+    }
+    if (clt_clock_since(started_ns) >= watch->patience_s) {
+      return fail_changed(session, &change, *looks, error);
+    }
+  }
+}
+
+clt_status clt_session_look(clt_session *session, clt_error *error) {
+  clt_watch *watch = &session->watch;
+  if (!watch->ready || watch->since == 0) {
+    return CLT_OK;
+  }
+  int looks = 0;
+  size_t bytes = clt_image_size(&session->drive) * sizeof *session->drive.data;
+  memcpy(watch->drive.data, session->drive.data, bytes);
+  clt_status status = look_until_same(session, &looks, error);
+  memcpy(session->drive.data, watch->drive.data, bytes);
+  if (status != CLT_OK) {
+    return status;
+  }
+  if (looks > 1 || watch->troubled) {
+    watch->again = ++watch->passes <= PASSES_MAX;
+    return clt_fail(error, CLT_FAILED,
+                    "the room or the devices were disturbed after pattern %ld, and %d times before: keep people and "
+                    "lights out, check the devices, and measure again",
+                    watch->good_done, watch->passes - 1);
+  }
+  mark_good(session);
+  return CLT_OK;
+}
+
+/* Whether a repeat shows what the first one did, which is kept in the watch. Where not, all repeats are taken again. */
+static clt_status check_repeat(clt_session *session, int k, double tolerance, clt_error *error) {
+  clt_watch *watch = &session->watch;
+  size_t values = clt_image_size(&session->seen);
+  for (size_t i = 0; k == 0 && i < values; i++) {
+    watch->expected.data[i] = session->seen.data[i];
+    watch->variance.data[i] = session->deviation.data[i] * session->deviation.data[i];
+  }
+  clt_change change =
+      clt_watch_compare(&watch->expected, &watch->variance, &session->seen, &session->deviation, tolerance);
+  if (!(change.share > 0)) {
+    return CLT_OK;
+  }
+  watch->disturbed_ns = watch->disturbed_ns > 0 ? watch->disturbed_ns : clt_clock_ns();
+  watch->again = clt_clock_since(watch->disturbed_ns) < watch->patience_s;
+  return fail_changed(session, &change, k, error);
+}
+
+/* Sums and numbers of the valid observations. */
+static clt_status sum_repeats(clt_session *session, const char *phase, clt_image *sum, clt_image *count,
+                              clt_error *error) {
+  size_t values = clt_image_size(sum);
+  const double tolerance = session->drive.data[0] > 0 ? STEADY : STEADY_BLACK;
+  memset(sum->data, 0, values * sizeof *sum->data);
+  memset(count->data, 0, values * sizeof *count->data);
+  for (int k = 0; k < session->options.repeats; k++) {
+    clt_status status = clt_session_observe(session, phase, error);
+    if (status == CLT_OK && session->watch.every > 0) {
+      status = check_repeat(session, k, tolerance, error);
+    }
+    if (status != CLT_OK) {
+      return status;
+    }
+    for (size_t i = 0; i < values; i++) {
+      if (isfinite(session->deviation.data[i])) {
+        sum->data[i] += session->seen.data[i];
+        count->data[i] += 1;
+      }
+    }
   }
   return CLT_OK;
 }
 
 clt_status clt_session_average(clt_session *session, const char *phase, clt_image *mean, clt_image *variance,
                                clt_error *error) {
+  mark_good(session);
+  /* Until all are there, mean holds the sums and variance the numbers. The deviations of the repeats are alike, so that
+   * the last one stands for all. */
+  clt_status status = sum_repeats(session, phase, mean, variance, error);
   size_t values = clt_image_size(mean);
-  /* While averaging, mean holds the sums and variance the number of valid observations. The deviations of the repeats
-   * are alike, so that the last one stands for all. */
-  for (size_t i = 0; i < values; i++) {
-    mean->data[i] = 0;
-    variance->data[i] = 0;
-  }
-  for (int k = 0; k < session->options.repeats; k++) {
-    clt_status status = clt_session_observe(session, phase, error);
-    if (status != CLT_OK) {
-      return status;
-    }
-    for (size_t i = 0; i < values; i++) {
-      if (isfinite(session->deviation.data[i])) {
-        mean->data[i] += session->seen.data[i];
-        variance->data[i] += 1;
-      }
-    }
-  }
-  for (size_t i = 0; i < values; i++) {
+  for (size_t i = 0; status == CLT_OK && i < values; i++) {
     float count = variance->data[i], deviation = session->deviation.data[i];
     mean->data[i] = count > 0 ? mean->data[i] / count : session->seen.data[i];
     variance->data[i] = count > 0 ? deviation * deviation / count : INFINITY;
   }
-  return CLT_OK;
+  session->watch.disturbed_ns = status == CLT_OK ? 0 : session->watch.disturbed_ns;
+  return status;
 }
 
 bool clt_session_may_go_on(const clt_session *session) {

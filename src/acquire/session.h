@@ -3,6 +3,7 @@
 #define CLT_ACQUIRE_SESSION_H
 
 #include "acquire/journal.h"
+#include "acquire/watch.h"
 #include "counterlight/acquire.h"
 
 typedef struct clt_session {
@@ -16,6 +17,7 @@ typedef struct clt_session {
   clt_image flood, flood_variance; /* likewise, the black subtracted; an infinite variance: not seen in any repeat */
   clt_progress progress;
   clt_journal journal;
+  clt_watch watch;
   char plan[CLT_TEXT_MAX]; /* the scheme, and why this one */
   int64_t started_ns;
 } clt_session;
@@ -36,10 +38,21 @@ extern const clt_scheme clt_scheme_brute, clt_scheme_hadamard, clt_scheme_hierar
 clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquire_options *options, clt_error *error);
 void clt_session_finish(clt_session *session); /* accepts a half-built one */
 
+/* The next pattern is the first of black, flood and the scheme: the place from which to begin again. */
+void clt_session_mark_start(clt_session *session);
+/* After a failure: *again where the watch wants the same patterns once more, which then come from the journal up to the
+ * last good look. Otherwise the failure stands. */
+clt_status clt_session_begin_again(clt_session *session, bool *again, clt_error *error);
+/* From here on black and flood are what the watch expects. */
+void clt_session_watch(clt_session *session);
+/* Looks at white, if the watch is on and there were patterns since the last look. Where it had changed, fails once it
+ * is again as it was, or after the patience. */
+clt_status clt_session_look(clt_session *session, clt_error *error);
+
 /* Drives every cell of every channel with one value. */
 void clt_session_fill(clt_session *session, float value);
-/* Shows session->drive and observes it; counts it and reports progress. CLT_CANCELLED where the caller wants no more.
- */
+/* Shows session->drive and observes it, after a look where one is due; counts it and reports progress. CLT_CANCELLED
+ * where the caller wants no more. */
 clt_status clt_session_observe(clt_session *session, const char *phase, clt_error *error);
 /* Observes the drive options.repeats times: mean of the valid observations of each value and the variance of that mean
  * (infinite where none was valid; the mean is then the last bound seen). */

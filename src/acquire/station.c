@@ -3,6 +3,12 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "counterlight/replay.h"
+
+/* Where neither the file nor a scene says. */
+#define TIMEOUT_S 2.0
+enum { ATTEMPTS = 3 };
+
 /* A driver opens its devices for a station; scene is NULL where the configuration names none. A driver of cameras only
  * has no open_projector, and the other way round. */
 typedef struct driver_entry {
@@ -53,21 +59,43 @@ static clt_status find_driver(const char *name, bool camera, const driver_entry 
                   name, names);
 }
 
-clt_status clt_station_open(const clt_station_config *config, clt_station *station, clt_error *error) {
+static clt_status open_drivers(const clt_station_config *config, clt_station *station, clt_error *error) {
   const driver_entry *projector = NULL, *camera = NULL;
-  *station = (clt_station){0};
   clt_status status = find_driver(config->projector, false, &projector, error);
   if (status == CLT_OK) {
     status = find_driver(config->camera, true, &camera, error);
+  }
+  if (status == CLT_OK) {
+    status = projector->open_projector(station->scene, &station->projector, error);
+  }
+  return status == CLT_OK ? camera->open_camera(station->scene, &station->camera, error) : status;
+}
+
+/* Puts the recorder before the devices. */
+static clt_status record_devices(const char *folder, clt_station *station, clt_error *error) {
+  station->recorded_projector = station->projector;
+  station->recorded_camera = station->camera;
+  station->projector = NULL;
+  station->camera = NULL;
+  return clt_recording_open(folder, station->recorded_projector, station->recorded_camera, &station->projector,
+                            &station->camera, error);
+}
+
+clt_status clt_station_open(const clt_station_config *config, clt_station *station, clt_error *error) {
+  *station = (clt_station){0};
+  clt_status status = CLT_OK;
+  if (config->calibration[0] != '\0') {
+    status = clt_calibration_load(config->calibration, &station->calibration, error);
   }
   if (status == CLT_OK && config->scene[0] != '\0') {
     status = clt_scene_open(config->scene, &station->scene, error);
   }
   if (status == CLT_OK) {
-    status = projector->open_projector(station->scene, &station->projector, error);
+    status = config->replay[0] != '\0' ? clt_replay_open(config->replay, &station->projector, &station->camera, error)
+                                       : open_drivers(config, station, error);
   }
-  if (status == CLT_OK) {
-    status = camera->open_camera(station->scene, &station->camera, error);
+  if (status == CLT_OK && config->record[0] != '\0') {
+    status = record_devices(config->record, station, error);
   }
   if (status != CLT_OK) {
     clt_station_close(station);
@@ -75,36 +103,52 @@ clt_status clt_station_open(const clt_station_config *config, clt_station *stati
   return status;
 }
 
-/* The rig's settings with what the configuration leaves out taken from the scene. */
-static clt_rig_config complete_rig(const clt_station_config *config, const clt_scene *scene) {
+clt_rig_config clt_station_rig_config(const clt_station_config *config, const clt_station *station) {
   clt_rig_config rig = config->rig, measured = config->rig;
-  if (scene != NULL) {
-    clt_scene_rig_config(scene, &measured);
+  if (station->scene != NULL) {
+    clt_scene_rig_config(station->scene, &measured);
   }
-  if (rig.width == 0) {
-    rig.width = measured.width;
-    rig.height = measured.height;
+  if (station->calibration != NULL) {
+    clt_calibration_apply(station->calibration, &measured);
   }
-  if (rig.exposure_count == 0) {
-    memcpy(rig.exposures_s, measured.exposures_s, sizeof rig.exposures_s);
-    rig.exposure_count = measured.exposure_count;
+  /* A cell's mean moves with the exposure where some of its pixels saturate: only whole-factor cells, whose pixels see
+   * the same light, are sure to agree. */
+  measured.verify = config->verify_given ? rig.verify : station->calibration == NULL;
+  measured.patch = rig.patch;
+  if (rig.width != 0) {
+    measured.width = rig.width;
+    measured.height = rig.height;
   }
-  rig.latency_s = rig.latency_s < 0 ? measured.latency_s : rig.latency_s;
-  rig.timeout_s = rig.timeout_s > 0 ? rig.timeout_s : measured.timeout_s;
-  rig.attempts = rig.attempts > 0 ? rig.attempts : measured.attempts;
+  if (rig.exposure_count != 0) {
+    memcpy(measured.exposures_s, rig.exposures_s, sizeof rig.exposures_s);
+    measured.exposure_count = rig.exposure_count;
+  }
+  measured.latency_s = rig.latency_s < 0 ? measured.latency_s : rig.latency_s;
+  measured.timeout_s = rig.timeout_s > 0 ? rig.timeout_s : measured.timeout_s > 0 ? measured.timeout_s : TIMEOUT_S;
+  measured.attempts = rig.attempts > 0 ? rig.attempts : measured.attempts > 0 ? measured.attempts : ATTEMPTS;
   for (int c = 0; c < CLT_PANEL_CHANNELS && config->projector_response_given; c++) {
     measured.projector.response[c] = rig.projector.response[c];
   }
-  rig.projector = measured.projector;
-  rig.camera = config->camera_response_given ? rig.camera : measured.camera;
-  memcpy(rig.source, measured.source, sizeof rig.source);
-  return rig;
+  measured.camera = config->camera_response_given ? rig.camera : measured.camera;
+  return measured;
 }
 
 clt_status clt_station_open_rig(const clt_station_config *config, clt_station *station, clt_projector *projector,
                                 clt_error *error) {
-  clt_rig_config rig = complete_rig(config, station->scene);
-  return clt_rig_open(&rig, projector != NULL ? projector : station->projector, station->camera, &station->rig, error);
+  clt_rig_config rig = clt_station_rig_config(config, station);
+  clt_status status =
+      clt_rig_open(&rig, projector != NULL ? projector : station->projector, station->camera, &station->rig, error);
+  return status != CLT_OK && config->calibration[0] != '\0' ? clt_fail_within(error, "with %s: ", config->calibration)
+                                                            : status;
+}
+
+static void close_devices(clt_projector *projector, clt_camera *camera) {
+  if (camera != NULL) {
+    camera->driver->close(camera);
+  }
+  if (projector != NULL) {
+    projector->driver->close(projector);
+  }
 }
 
 void clt_station_close(clt_station *station) {
@@ -114,12 +158,9 @@ void clt_station_close(clt_station *station) {
   if (station->rig != NULL) {
     station->rig->operations->close(station->rig);
   }
-  if (station->camera != NULL) {
-    station->camera->driver->close(station->camera);
-  }
-  if (station->projector != NULL) {
-    station->projector->driver->close(station->projector);
-  }
+  close_devices(station->projector, station->camera);
+  close_devices(station->recorded_projector, station->recorded_camera);
   clt_scene_close(station->scene);
+  clt_calibration_destroy(station->calibration);
   *station = (clt_station){0};
 }

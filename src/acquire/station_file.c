@@ -32,6 +32,15 @@ static void read_device(clt_section device, char *driver, size_t size, clt_curve
   }
 }
 
+static void read_patch(clt_section section, clt_patch *patch) {
+  patch->left = clt_read_integer(section, "left", 0, 0, CLT_GRID_SIDE_MAX);
+  patch->top = clt_read_integer(section, "top", 0, 0, CLT_GRID_SIDE_MAX);
+  patch->side = clt_read_integer(section, "side", 0, 1, CLT_GRID_SIDE_MAX / 4);
+  if (section.group != NULL && !clt_section_has(section, "side")) {
+    clt_section_fail(section, NULL, "patch needs a side, the cells of one of its 4 x 4 blocks");
+  }
+}
+
 static void read_rig(clt_section section, clt_rig_config *rig) {
   double exposures_ms[CLT_EXPOSURES_MAX];
   rig->width = clt_read_integer(section, "width", 0, 1, CLT_GRID_SIDE_MAX);
@@ -51,6 +60,8 @@ static void read_rig(clt_section section, clt_rig_config *rig) {
   rig->latency_s = latency_ms < 0 ? -1 : latency_ms * MS;
   rig->timeout_s = clt_read_number(section, "timeout_ms", 0, 1, 600000) * MS;
   rig->attempts = clt_read_integer(section, "attempts", 0, 1, 100);
+  rig->verify = clt_read_flag(section, "verify", false);
+  read_patch(clt_section_group(section, "patch"), &rig->patch);
 }
 
 static void read_acquire(clt_section section, clt_station_config *config) {
@@ -61,17 +72,29 @@ static void read_acquire(clt_section section, clt_station_config *config) {
   acquire->seconds = clt_read_number(section, "seconds", 0, 0, 1e9);
   acquire->repeats = clt_read_integer(section, "repeats", 0, 1, 256);
   acquire->checks = clt_read_integer(section, "checks", 2, 0, 64);
+  acquire->watch = clt_read_integer(section, "watch", 0, 0, 1000000);
   acquire->seed = (unsigned)clt_read_integer(section, "seed", 0, 0, 1000000000);
 }
 
-static clt_status read_scene(clt_section root, const char *path, clt_station_config *config, clt_error *error) {
-  const char *scene = clt_read_text(root, "scene", "", CLT_PATH_MAX - 1);
-  if (scene[0] == '\0') {
+/* A file or folder that the configuration names, relative to its own folder; "" where it names none. */
+static clt_status read_place(clt_section section, const char *key, const char *path, char *place, clt_error *error) {
+  const char *name = clt_read_text(section, key, "", CLT_PATH_MAX - 1);
+  if (name[0] == '\0') {
     return CLT_OK;
   }
   char folder[CLT_PATH_MAX];
   clt_file_folder(path, folder);
-  return clt_file_join(folder, scene, config->scene, error);
+  clt_status status = clt_file_join(folder, name, place, error);
+  return status == CLT_OK ? status : clt_fail_within(error, "%s: %s: ", path, key);
+}
+
+static clt_status read_places(clt_section root, const char *path, clt_station_config *config, clt_error *error) {
+  clt_section rig = clt_section_group(root, "rig");
+  clt_status status = read_place(root, "scene", path, config->scene, error);
+  if (status == CLT_OK) {
+    status = read_place(root, "replay", path, config->replay, error);
+  }
+  return status == CLT_OK ? read_place(rig, "calibration", path, config->calibration, error) : status;
 }
 
 clt_status clt_station_read(const char *path, clt_station_config *config, clt_error *error) {
@@ -82,13 +105,14 @@ clt_status clt_station_read(const char *path, clt_station_config *config, clt_er
   }
   set_defaults(config);
   clt_section root = clt_settings_root(settings);
-  status = read_scene(root, path, config, error);
+  status = read_places(root, path, config, error);
   clt_curve panel = {.kind = CLT_CURVE_LINEAR};
   read_device(clt_section_group(root, "projector"), config->projector, sizeof config->projector, &panel,
               &config->projector_response_given);
   config->rig.projector = clt_panel_of_curve(&panel);
   read_device(clt_section_group(root, "camera"), config->camera, sizeof config->camera, &config->rig.camera,
               &config->camera_response_given);
+  config->verify_given = clt_section_has(clt_section_group(root, "rig"), "verify");
   read_rig(clt_section_group(root, "rig"), &config->rig);
   read_acquire(clt_section_group(root, "acquire"), config);
   clt_section_leave(root, "daemon");

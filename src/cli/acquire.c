@@ -14,6 +14,9 @@ static const cli_option options[] = {
     {"error", 0, "X", "wanted appearance error: blocks stops there, auto chooses by it (0..0.5)"},
     {"seconds", 0, "X", "time allowed: blocks stops there, auto chooses by it"},
     {"resume", 0, "FILE", "keep every observation there, and begin with those it holds"},
+    {"calibration", 0, "FILE", "of the rig (default: the configuration's)"},
+    {"record", 0, "DIR", "keep every frame there"},
+    {"replay", 0, "DIR", "take the frames from a recording, no device is opened"},
     {"threshold", 0, "X", "hierarchical: fraction of a cell's light left unresolved (0..0.5)"},
     {"repeats", 0, "N", "observations averaged for black and flood (1..256)"},
     {NULL, 0, NULL, NULL},
@@ -22,6 +25,8 @@ static const cli_option options[] = {
 static const char notes[] =
     "Ctrl-C ends it with nothing written but the file of --resume: the same command then goes on from there, also\n"
     "after a crash. The file is removed when the transport is stored.\n"
+    "A camera with pixels of its own and no calibration is calibrated first. --replay needs the configuration or the\n"
+    "scene of the recording, which give the rig's settings, and the same options: the same T comes out.\n"
     "The check error is the relative RMS between random patterns as observed and as\n"
     "the stored transport predicts them.\n";
 
@@ -50,11 +55,7 @@ static clt_status read_options(const cli_command *command, const cli_arguments *
 }
 
 static clt_status measure(task *t, clt_error *error) {
-  cli_progress_note(&t->progress, "opening the devices");
-  clt_status status = clt_station_open(&t->config, &t->station, error);
-  if (!status) {
-    status = clt_station_open_rig(&t->config, &t->station, NULL, error);
-  }
+  clt_status status = cli_station_open(&t->config, &t->progress, &t->station, error);
   if (!status) {
     status = cli_measure(&t->config, &t->station, &t->progress, &t->transport, error);
   }

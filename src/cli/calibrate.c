@@ -1,55 +1,42 @@
-/* counterlight calibrate: the geometry of a rig by structured light, from a replay. */
-#include <stdlib.h>
-#include <string.h>
+/* counterlight calibrate: what a rig must know of its projector and its camera, from the devices or from a replay. */
+#include "cli/calibrate.h"
 
 #include "base/file.h"
 #include "cli/answer.h"
-#include "cli/calibrate_report.h"
-#include "cli/command.h"
 #include "cli/folder.h"
-#include "cli/progress.h"
 #include "counterlight/replay.h"
 
-#define ANY_EXPOSURE_S 0.01 /* pictures have whatever is asked for */
-
 static const cli_option options[] = {
+    {"config", 'c', "C", "configuration that names the devices to calibrate"},
+    {"scene", 's', "S", "scene file: calibrate simulated devices"},
+    {"record", 0, "DIR", "keep every frame there, to be calibrated from again"},
     {"replay", 0, "DIR", "a recording, a folder of pictures, or a list of them"},
-    {"panel", 0, "WxH", "the panel's pixels (a recording knows them; default 1280x720)"},
+    {"output", 'o', "DIR", "where the results go (default calibration)"},
+    {"levels", 0, "N", "of the projector's ramps, 17..65 (default 33)"},
+    {"frames", 0, "N", "averaged for each field, 2..64 (default 6; noise needs two)"},
+    {"watch", 0, "X", "seconds to watch the camera for automatic controls (default 20; 0: not at all)"},
     {"reference", 0, "FILE", "calibration (OpenCV's YAML) to check against"},
-    {"response", 0, "CURVE", "the camera's: linear, srgb or gamma:G (default: srgb for pictures)"},
-    {"exposure-ms", 0, "X", "exposure time of the recorded frames to take (default: the longest)"},
-    {"output", 'o', "DIR", "where map.npy, coverage.png and summary.json go (default calibration)"},
+    {"panel", 0, "WxH", "pictures: the panel's pixels (default 1280x720)"},
+    {"response", 0, "CURVE", "pictures: the camera's: linear, srgb or gamma:G (default srgb)"},
+    {"exposure-ms", 0, "X", "recorded pictures alone: exposure time of the frames to take (default: the longest)"},
     {NULL, 0, NULL, NULL},
 };
 
 static const char notes[] =
-    "Decodes Gray code pictures with their inverses (columns from the coarsest bit, then rows) to the panel "
-    "coordinate\n"
-    "that each camera pixel sees. map.npy holds x, y and confidence, float32 [3, height, width], NaN where masked: "
-    "panel\n"
-    "pixel k spans [k, k + 1). coverage.png shows decoded pixels by their place on the panel, and masked ones by "
-    "cause:\n"
-    "black unlit, white saturated, blue ambiguous, magenta outside the panel, yellow isolated, cyan lit from two "
-    "places.\n"
+    "Measures latency and jitter, the responses of projector and camera, crosstalk, black, noise, the exposures to\n"
+    "take, and by structured light the panel coordinate that each camera pixel sees. calibration.h5 holds it all for\n"
+    "rigs that are opened later, report.html shows it, summary.json has the numbers. A recording of a whole\n"
+    "calibration is calibrated from in the same way, with the same --levels, --frames and --watch.\n"
+    "What is wrong and what to do is printed line by line: WRONG where measurements are wrong until it is put right.\n"
+    "\n"
+    "Of pictures only the geometry is found: Gray code with inverses, columns from the coarsest bit, then rows.\n"
+    "map.npy holds x, y and confidence, float32 [3, height, width], NaN where masked: panel pixel k spans [k, k + 1).\n"
+    "coverage.png shows decoded pixels by their place on the panel, and masked ones by cause: black unlit, white\n"
+    "saturated, blue ambiguous, magenta outside the panel, yellow isolated, cyan lit from two places.\n"
     "Distances are those of camera pixels from the epipolar lines of --reference, or without one of the map's own\n"
-    "fundamental matrix. What is wrong and what to do is printed line by line.\n";
+    "fundamental matrix.\n";
 
-typedef struct task {
-  const char *replay, *reference;
-  clt_stereo stereo; /* of the reference */
-  char folder[CLT_PATH_MAX];
-  int panel_width, panel_height;
-  clt_curve response;
-  bool response_given;
-  double exposure_s;
-  clt_projector *projector;
-  clt_camera *camera;
-  clt_geometry_options how;
-  cli_calibration found;
-  cli_progress progress;
-} task;
-
-static clt_status read_panel(const char *text, task *t, clt_error *error) {
+static clt_status read_panel(const char *text, cli_calibrate *t, clt_error *error) {
   int end = 0;
   if (sscanf(text, "%dx%d%n", &t->panel_width, &t->panel_height, &end) != 2 || text[end] != '\0') {
     return clt_fail(error, CLT_BAD_INPUT, "--panel: '%s' is no size; give it like 1280x720", text);
@@ -57,14 +44,15 @@ static clt_status read_panel(const char *text, task *t, clt_error *error) {
   return CLT_OK;
 }
 
-static clt_status read_options(const cli_command *command, const cli_arguments *arguments, task *t, clt_error *error) {
+/* What --replay of pictures needs. */
+static clt_status read_pictures(const cli_command *command, const cli_arguments *arguments, cli_calibrate *t,
+                                clt_error *error) {
   const char *panel = cli_value(command, arguments, "panel"), *curve = cli_value(command, arguments, "response");
   double exposure_ms = 0;
-  clt_status status = cli_required(command, arguments, "replay", &t->replay, error);
-  t->reference = cli_value(command, arguments, "reference");
+  clt_status status = CLT_OK;
   t->panel_width = 1280;
   t->panel_height = 720;
-  if (!status && panel != NULL) {
+  if (panel != NULL) {
     status = read_panel(panel, t, error);
   }
   if (!status && curve != NULL) {
@@ -75,46 +63,58 @@ static clt_status read_options(const cli_command *command, const cli_arguments *
     status = cli_number(command, arguments, "exposure-ms", 1e-3, 1e6, &exposure_ms, error);
     t->exposure_s = exposure_ms * 1e-3;
   }
+  return status;
+}
+
+static clt_status read_measure(const cli_command *command, const cli_arguments *arguments, cli_calibrate *t,
+                               clt_error *error) {
+  const char *watch = cli_value(command, arguments, "watch");
+  clt_status status = cli_integer(command, arguments, "levels", 17, 65, &t->options.levels, error);
   if (!status) {
-    status = cli_folder_choose(cli_value(command, arguments, "output"), "calibration", t->folder, error);
+    status = cli_integer(command, arguments, "frames", 2, 64, &t->options.frames, error);
+  }
+  if (!status) {
+    status = cli_number(command, arguments, "watch", 0, 600, &t->options.watch_s, error);
+  }
+  if (!status && watch != NULL && t->options.watch_s == 0) {
+    t->options.watch_s = -1;
   }
   return status;
 }
 
-static bool show_progress(void *context, int done, int total) {
-  task *t = context;
-  char note[64];
-  snprintf(note, sizeof note, "picture %d of %d", done, total);
-  cli_progress_note(&t->progress, note);
-  return !cli_interrupted();
+/* One source of frames: a configuration, a scene or a replay. */
+static clt_status read_source(const cli_command *command, const cli_arguments *arguments, cli_calibrate *t,
+                              clt_error *error) {
+  const char *config = cli_value(command, arguments, "config"), *scene = cli_value(command, arguments, "scene");
+  t->replay = cli_value(command, arguments, "replay");
+  t->record = cli_value(command, arguments, "record");
+  if ((config != NULL) + (scene != NULL) + (t->replay != NULL) != 1) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "give one of --config, --scene and --replay; usage: counterlight calibrate %s", command->synopsis);
+  }
+  if (t->replay != NULL) {
+    return t->record == NULL ? CLT_OK
+                             : clt_fail(error, CLT_BAD_INPUT,
+                                        "--record: what is replayed is recorded already; copy %s instead", t->replay);
+  }
+  return config ? clt_station_read(config, &t->config, error) : clt_station_for_scene(scene, &t->config, error);
 }
 
-static clt_status open_recording(task *t, clt_error *error) {
-  clt_projector_info panel;
-  double longest_s = 0;
-  clt_status status = clt_replay_longest_exposure(t->replay, &longest_s, error);
+static clt_status read_options(const cli_command *command, const cli_arguments *arguments, cli_calibrate *t,
+                               clt_error *error) {
+  clt_status status = read_source(command, arguments, t, error);
+  t->reference = cli_value(command, arguments, "reference");
   if (!status) {
-    status = clt_replay_open(t->replay, &t->projector, &t->camera, error);
+    status = read_measure(command, arguments, t, error);
   }
-  if (status) {
-    return status;
+  if (!status) {
+    status = read_pictures(command, arguments, t, error);
   }
-  t->projector->driver->describe(t->projector, &panel);
-  t->how.exposure_s = t->exposure_s > 0 ? t->exposure_s : longest_s;
-  return clt_gray_init(&t->how.gray, panel.width, panel.height, error);
-}
-
-static clt_status open_pictures(task *t, clt_error *error) {
-  int pictures = 0;
-  clt_status status =
-      clt_replay_open_pictures(t->replay, t->panel_width, t->panel_height, &t->projector, &t->camera, &pictures, error);
-  t->how.exposure_s = t->exposure_s > 0 ? t->exposure_s : ANY_EXPOSURE_S;
-  t->response = t->response_given ? t->response : (clt_curve){.kind = CLT_CURVE_SRGB};
-  return status ? status : clt_gray_init_counted(&t->how.gray, t->panel_width, t->panel_height, pictures, error);
+  return status ? status : cli_folder_choose(cli_value(command, arguments, "output"), "calibration", t->folder, error);
 }
 
 /* A map that cannot be checked is still a map. */
-static void check_epipolar(task *t) {
+static void check_epipolar(cli_calibrate *t) {
   clt_error error = {0};
   if (t->found.geometry.decode.count[CLT_PIXEL_DECODED] == 0) {
     return; /* findings say so */
@@ -126,28 +126,59 @@ static void check_epipolar(task *t) {
   }
 }
 
-static clt_status measure(task *t, clt_error *error) {
-  clt_shots shots;
-  clt_status status = t->reference != NULL ? clt_stereo_read(t->reference, &t->stereo, error) : CLT_OK;
-  if (!status) {
-    status = clt_replay_is_recording(t->replay) ? open_recording(t, error) : open_pictures(t, error);
-  }
+/* A whole calibration begins with a white panel, structured light with stripes. */
+static clt_status begins_white(const char *folder, bool *white, clt_error *error) {
+  clt_projector *projector = NULL;
+  clt_camera *camera = NULL;
+  clt_projector_info panel;
+  clt_status status = clt_replay_open(folder, &projector, &camera, error);
   if (status) {
     return status;
   }
-  t->how.response = t->response;
-  t->how.progress = show_progress;
-  t->how.context = t;
-  clt_shots_init(&shots, t->projector, t->camera, 0, 1, 1);
-  status = clt_geometry_measure(&shots, &t->how, &t->found.geometry, &t->found.findings, error);
+  projector->driver->describe(projector, &panel);
+  clt_image picture = {0};
+  status = clt_image_init(&picture, panel.channels, panel.height, panel.width, error);
+  for (size_t k = 0; !status && k < (size_t)panel.channels * (size_t)panel.height * (size_t)panel.width; k++) {
+    picture.data[k] = 1;
+  }
+  int64_t shown_ns = 0;
+  *white = !status && projector->driver->present(projector, picture.data, &shown_ns, NULL) == CLT_OK;
+  clt_image_finish(&picture);
+  projector->driver->close(projector);
+  camera->driver->close(camera);
+  return status;
+}
+
+static clt_status measure(cli_calibrate *t, clt_error *error) {
+  bool whole = t->replay == NULL;
+  clt_status status = t->reference != NULL ? clt_stereo_read(t->reference, &t->stereo, error) : CLT_OK;
+  if (!status && t->replay != NULL && clt_replay_is_recording(t->replay)) {
+    status = begins_white(t->replay, &whole, error);
+  }
+  if (!status) {
+    status = whole ? cli_calibrate_whole(t, error) : cli_calibrate_geometry(t, error);
+  }
   if (!status) {
     check_epipolar(t);
   }
   return status;
 }
 
+static void close_all(cli_calibrate *t) {
+  if (t->found.whole != NULL) {
+    clt_calibration_destroy(t->found.whole);
+  } else {
+    clt_geometry_finish(&t->found.geometry);
+  }
+  if (t->projector != NULL) {
+    t->projector->driver->close(t->projector);
+    t->camera->driver->close(t->camera);
+  }
+  clt_station_close(&t->station);
+}
+
 static int run(const cli_command *command, const cli_arguments *arguments) {
-  task t = {0};
+  cli_calibrate t = {0};
   clt_error error = {0};
   cli_progress_begin(&t.progress, arguments->quiet);
   clt_status status = read_options(command, arguments, &t, &error);
@@ -159,18 +190,14 @@ static int run(const cli_command *command, const cli_arguments *arguments) {
     status = cli_calibration_write(t.folder, &t.found, arguments, &error);
   }
   int code = status ? cli_fail(command, &error) : CLI_DONE;
-  clt_geometry_finish(&t.found.geometry);
-  if (t.projector != NULL) {
-    t.projector->driver->close(t.projector);
-    t.camera->driver->close(t.camera);
-  }
+  close_all(&t);
   return code;
 }
 
 const cli_command cli_command_calibrate = {
     .name = "calibrate",
-    .synopsis = "--replay DIR [options]",
-    .summary = "find where on the panel each camera pixel looks, from recorded frames",
+    .synopsis = "--config C | --scene S | --replay DIR [-o DIR] [options]",
+    .summary = "measure what a rig must know of its projector and camera, and say what is wrong",
     .options = options,
     .run = run,
     .notes = notes,

@@ -31,61 +31,20 @@ static clt_status write_pictures(const char *folder, const clt_pixel_map *map, c
   return status;
 }
 
-static json_t *json_fates(const clt_decode_report *decode) {
-  json_t *object = json_object();
-  for (int fate = 0; fate < CLT_PIXEL_FATES; fate++) {
-    json_object_set_new(object, clt_pixel_fate_name(fate), json_integer(decode->count[fate]));
+static void print_whole(const cli_calibration *found) {
+  const clt_calibration_info *info = &found->whole->info;
+  printf("latency %.1f ms, jitter %.1f ms; pictures are complete after %.1f ms\n", 1e3 * info->latency_s,
+         1e3 * info->jitter_s, 1e3 * info->complete_s);
+  printf("black");
+  for (int c = 0; c < info->channels; c++) {
+    printf(" %.5f", info->black[c]);
   }
-  return object;
-}
-
-static json_t *json_regions(const clt_regions *regions) {
-  json_t *array = json_array();
-  for (int k = 0; k < regions->count; k++) {
-    const clt_region *region = &regions->region[k];
-    json_array_append_new(array, json_pack("{s:s, s:I, s:[i, i, i, i], s:s}", "fate", clt_pixel_fate_name(region->fate),
-                                           "pixels", (json_int_t)region->pixels, "box", region->left, region->top,
-                                           region->right, region->bottom, "why", region->text));
+  printf(" of white; camera %s, full well %.0f electrons, read noise %.1f\nexposures",
+         info->camera.kind == CLT_CURVE_LINEAR ? "linear" : "with a response curve", info->full_well, info->read_noise);
+  for (int k = 0; k < info->exposure_count; k++) {
+    printf("%s %.4g", k > 0 ? "," : "", 1e3 * info->exposures_s[k]);
   }
-  return array;
-}
-
-static json_t *json_drift(const clt_drift *drift) {
-  json_t *channels = json_array();
-  for (int c = 0; c < drift->channels; c++) {
-    json_array_append_new(channels, json_pack("{s:f, s:f}", "all", clt_drift_span(drift, c, false), "wide",
-                                              clt_drift_span(drift, c, true)));
-  }
-  return channels;
-}
-
-static json_t *json_findings(const clt_findings *findings) {
-  json_t *array = json_array();
-  for (int k = 0; k < findings->count; k++) {
-    json_array_append_new(
-        array, json_pack("{s:b, s:s}", "serious", findings->item[k].serious, "text", findings->item[k].text));
-  }
-  return array;
-}
-
-static json_t *json_epipolar(const clt_epipolar *epipolar) {
-  return epipolar->count == 0 ? json_null()
-                              : json_pack("{s:b, s:I, s:f, s:f, s:I, s:f, s:f}", "fitted", epipolar->fitted, "pixels",
-                                          (json_int_t)epipolar->count, "median", epipolar->median, "p90",
-                                          epipolar->upper, "sure_pixels", (json_int_t)epipolar->sure, "sure_median",
-                                          epipolar->sure_median, "sure_p90", epipolar->sure_upper);
-}
-
-static json_t *summary(const char *folder, const cli_calibration *found) {
-  const clt_geometry *geometry = &found->geometry;
-  const clt_pixel_map *map = &geometry->map;
-  const clt_decode_report *decode = &geometry->decode;
-  return json_pack("{s:s, s:[i, i], s:[i, i], s:o, s:f, s:[f, f], s:f, s:o, s:o, s:I, s:o, s:o}", "output", folder,
-                   "camera", map->width, map->height, "panel", map->panel_width, map->panel_height, "fates",
-                   json_fates(decode), "pitch", decode->pitch, "blur", decode->blur[0], decode->blur[1], "noise",
-                   decode->noise, "epipolar", json_epipolar(&found->epipolar), "regions",
-                   json_regions(&geometry->regions), "smaller_regions", (json_int_t)geometry->regions.others, "drift",
-                   json_drift(&geometry->drift), "findings", json_findings(&found->findings));
+  printf(" ms; %.1f %% of the panel is seen\n", 100 * info->covered);
 }
 
 static void print_found(const char *folder, const cli_calibration *found) {
@@ -101,6 +60,9 @@ static void print_found(const char *folder, const cli_calibration *found) {
         "%.3f, %.3f\n",
         epipolar->fitted ? "fitted to this map" : "of the reference", epipolar->median, epipolar->upper,
         epipolar->sure_median, epipolar->sure_upper);
+  }
+  if (found->whole != NULL) {
+    print_whole(found);
   }
   printf("masked:");
   for (int fate = CLT_PIXEL_UNLIT; fate < CLT_PIXEL_FATES; fate++) {
@@ -118,9 +80,31 @@ static void print_found(const char *folder, const cli_calibration *found) {
   }
 }
 
+static clt_status write_whole(const char *folder, const cli_calibration *found, clt_error *error) {
+  char path[CLT_PATH_MAX];
+  clt_status status = clt_file_join(folder, "calibration.h5", path, error);
+  if (!status) {
+    status = clt_calibration_save(found->whole, path, error);
+  }
+  return status ? status : cli_calibration_page(folder, found, error);
+}
+
+static json_t *summary(const char *folder, const cli_calibration *found) {
+  if (found->whole != NULL) {
+    return cli_calibration_json(folder, found);
+  }
+  json_t *document = cli_geometry_json(found);
+  json_object_set_new(document, "output", json_string(folder));
+  json_object_set_new(document, "findings", cli_findings_json(&found->findings));
+  return document;
+}
+
 clt_status cli_calibration_write(const char *folder, const cli_calibration *found, const cli_arguments *arguments,
                                  clt_error *error) {
   clt_status status = write_pictures(folder, &found->geometry.map, error);
+  if (!status && found->whole != NULL) {
+    status = write_whole(folder, found, error);
+  }
   if (status) {
     return status;
   }

@@ -15,6 +15,7 @@ static const cli_option options[] = {
     {"predict", 'p', "SEEN", "also write what the drive will look like"},
     {"config", 'c', "C", "no transport: solve through the rig that this configuration names"},
     {"scene", 's', "S", "no transport: solve through simulated devices in this scene"},
+    {"calibration", 0, "FILE", "of the rig: the responses by which a .png drive is encoded"},
     {"photographs", 0, "N", "through a rig: at most so many (4..1000, default 40)"},
     {NULL, 0, NULL, NULL},
 };
@@ -23,8 +24,8 @@ static const char notes[] =
     "The picture is resampled to the transport's grid (a .npy must fit exactly) and read as linear light;\n"
     "its white means the radiance --white: auto is the median of the direct light of a fully driven cell,\n"
     "feasible the largest that every cell can reach.\n"
-    "A .png drive holds panel values, after the projector's response curve that the transport file names\n"
-    "(sRGB where it names none); .exr and .npy hold linear light.\n"
+    "A .png drive holds panel values, after the projector's response curve that the transport file names (sRGB\n"
+    "where it names none), or after the responses and crosstalk of --calibration; .exr and .npy hold linear light.\n"
     "--predict writes b0 + T x: divided by white and sRGB-encoded as .png or .jpg, so that it compares\n"
     "with the picture by eye; the radiance itself as .exr or .npy.\n"
     "With --config or --scene there is no transport: the room itself makes the products, a photograph each, and\n"
@@ -33,7 +34,7 @@ static const char notes[] =
     "(a .png rounds it to 8 bits), error_limit the least that any drive in 0..1 can reach.\n";
 
 typedef struct task {
-  const char *target, *output, *predict;
+  const char *target, *output, *predict, *calibration;
   clt_solve_options solve;
   clt_white white;
   cli_input input;
@@ -49,6 +50,7 @@ static clt_status read_options(const cli_command *command, const cli_arguments *
   if (!status) {
     status = cli_picture_output_check(t->output, error);
   }
+  t->calibration = cli_value(command, arguments, "calibration");
   t->predict = cli_value(command, arguments, "predict");
   if (!status && t->predict) {
     status = cli_picture_output_check(t->predict, error);
@@ -58,6 +60,12 @@ static clt_status read_options(const cli_command *command, const cli_arguments *
 
 static clt_status solve(const char *transport, task *t, clt_error *error) {
   clt_status status = cli_input_open(transport, &t->input, error);
+  if (!status) {
+    status = cli_input_calibrate(t->calibration, &t->input, error);
+  }
+  if (!status) {
+    status = cli_input_check_drive(&t->input, t->output, error);
+  }
   if (!status) {
     status = cli_picture_read(t->target, NULL, &t->input.grid, &t->picture, error);
   }
@@ -73,7 +81,7 @@ static clt_status judge_written(task *t, clt_error *error) {
   double white[CLT_CHANNELS_MAX];
   clt_image target = {0};
   clt_image_finish(&t->drive);
-  clt_status status = cli_picture_read(t->output, &t->input.response, &t->input.grid, &t->drive, error);
+  clt_status status = cli_picture_read(t->output, &t->input.panel, &t->input.grid, &t->drive, error);
   if (!status) {
     status = clt_predict(t->input.transport, &t->drive, &t->seen, error);
   }
@@ -88,7 +96,7 @@ static clt_status judge_written(task *t, clt_error *error) {
 }
 
 static clt_status write_pictures(task *t, clt_error *error) {
-  clt_status status = clt_image_write(t->output, &t->input.response, &t->drive, error);
+  clt_status status = clt_panel_write(t->output, &t->input.panel, &t->drive, error);
   if (!status) {
     status = judge_written(t, error);
   }

@@ -15,6 +15,7 @@ static const cli_option options[] = {
     {"target", 't', "PIC", "the picture to make appear (default: one that is drawn)"},
     {"output", 'o', "DIR", "folder of the results (default: demo-out)"},
     {"white", 'w', "W", "radiance of the picture's white: a number, auto or feasible"},
+    {"calibration", 0, "FILE", "of the scene's rig (default: a camera with pixels of its own is calibrated first)"},
     {"scheme", 0, "NAME", "of the acquisition: auto, brute, hadamard, hierarchical or blocks"},
     {NULL, 0, NULL, NULL},
 };
@@ -22,7 +23,8 @@ static const cli_option options[] = {
 static const char notes[] =
     "Measures the scene's light transport through noisy frames, solves with what was measured, projects the target\n"
     "as it is and compensated, photographs both, and leaves in DIR: target.png uncompensated.png compensated.png\n"
-    "pattern.png error-before.png error-after.png transport.h5 summary.json report.html.\n"
+    "pattern.png error-before.png error-after.png transport.h5 summary.json report.html, and\n"
+    "calibration.h5 where the camera has pixels of its own.\n"
     "Photographs are divided by white and sRGB-encoded, the uncompensated one after its best single brightness\n"
     "factor. pattern.png holds panel values. error_limit is the bounded optimum on the scene's exact transport.\n";
 

@@ -41,7 +41,7 @@ typedef struct demo {
   clt_station_config config;
   clt_station station;
   cli_grid grid;
-  clt_curve response; /* of the projector */
+  clt_panel panel; /* of the projector */
   cli_progress progress;
   clt_image picture; /* the target, linear, white = 1 */
   clt_transport *transport;

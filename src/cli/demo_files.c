@@ -72,7 +72,7 @@ static clt_status write_compensated(const char *path, const demo *d, clt_error *
 }
 
 static clt_status write_pattern(const char *path, const demo *d, clt_error *error) {
-  return clt_image_write(path, &d->response, &d->drive, error);
+  return clt_panel_write(path, &d->panel, &d->drive, error);
 }
 
 static clt_status write_error_before(const char *path, const demo *d, clt_error *error) {
@@ -85,6 +85,11 @@ static clt_status write_error_after(const char *path, const demo *d, clt_error *
 
 static clt_status write_transport(const char *path, const demo *d, clt_error *error) {
   return clt_transport_save(d->transport, path, error);
+}
+
+/* Where the camera had to be calibrated. */
+static clt_status write_calibration(const char *path, const demo *d, clt_error *error) {
+  return d->station.calibration ? clt_calibration_save(d->station.calibration, path, error) : CLT_OK;
 }
 
 static clt_status write_summary(const char *path, const demo *d, clt_error *error) {
@@ -102,9 +107,10 @@ static const struct {
   const char *name;
   clt_status (*write)(const char *path, const demo *d, clt_error *error);
 } results[] = {
-    {"transport.h5", write_transport},      {"target.png", write_target},    {"uncompensated.png", write_uncompensated},
-    {"compensated.png", write_compensated}, {"pattern.png", write_pattern},  {"error-before.png", write_error_before},
-    {"error-after.png", write_error_after}, {"summary.json", write_summary}, {"report.html", cli_report_write},
+    {"calibration.h5", write_calibration},      {"transport.h5", write_transport},      {"target.png", write_target},
+    {"uncompensated.png", write_uncompensated}, {"compensated.png", write_compensated}, {"pattern.png", write_pattern},
+    {"error-before.png", write_error_before},   {"error-after.png", write_error_after}, {"summary.json", write_summary},
+    {"report.html", cli_report_write},
 };
 
 clt_status demo_write(const demo *d, clt_error *error) {

@@ -12,11 +12,7 @@
 
 static clt_status open_station(demo *d, clt_error *error) {
   int64_t start = clt_clock_ns();
-  cli_progress_note(&d->progress, "computing the scene's light");
-  clt_status status = clt_station_open(&d->config, &d->station, error);
-  if (!status) {
-    status = clt_station_open_rig(&d->config, &d->station, NULL, error);
-  }
+  clt_status status = cli_station_open(&d->config, &d->progress, &d->station, error);
   if (status) {
     return status;
   }
@@ -24,7 +20,8 @@ static clt_status open_station(demo *d, clt_error *error) {
   d->station.rig->operations->describe(d->station.rig, &info);
   d->grid = (cli_grid){info.width, info.height, info.channels};
   d->timings.scene = clt_clock_since(start);
-  return clt_curve_parse(info.response, &d->response, error);
+  d->panel = clt_station_rig_config(&d->config, &d->station).projector;
+  return CLT_OK;
 }
 
 static clt_status load_picture(demo *d, clt_error *error) {

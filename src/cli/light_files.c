@@ -28,7 +28,10 @@ static clt_status take_values(const clt_image *image, double **values, clt_error
 clt_status cli_drive_values(const char *path, const cli_input *input, double **values, clt_error *error) {
   clt_image drive = {0};
   *values = NULL;
-  clt_status status = cli_drive_read(path, &input->response, &input->grid, &drive, error);
+  clt_status status = cli_input_check_drive(input, path, error);
+  if (!status) {
+    status = cli_drive_read(path, &input->panel, &input->grid, &drive, error);
+  }
   if (!status) {
     status = take_values(&drive, values, error);
   }

@@ -2,6 +2,7 @@
 #include "cli/optical.h"
 
 #include "cli/answer.h"
+#include "cli/measure.h"
 #include "cli/picture.h"
 #include "cli/progress.h"
 #include "counterlight/acquire.h"
@@ -13,7 +14,7 @@ typedef struct task {
   clt_station station;
   clt_optical_options options;
   cli_grid grid;
-  clt_curve response;
+  clt_panel panel;
   clt_image picture, drive;
   clt_optical_result result;
   cli_progress progress;
@@ -57,22 +58,19 @@ static clt_status read_options(const cli_command *command, const cli_arguments *
   if (!status) {
     status = config ? clt_station_read(config, &t->config, error) : clt_station_for_scene(scene, &t->config, error);
   }
-  return status;
+  return status ? status : cli_station_options(command, arguments, &t->config, error);
 }
 
 static clt_status open_rig(task *t, clt_error *error) {
-  cli_progress_note(&t->progress, "opening the devices");
-  clt_status status = clt_station_open(&t->config, &t->station, error);
-  if (!status) {
-    status = clt_station_open_rig(&t->config, &t->station, NULL, error);
-  }
+  clt_status status = cli_station_open(&t->config, &t->progress, &t->station, error);
   if (status) {
     return status;
   }
   clt_rig_info info;
   t->station.rig->operations->describe(t->station.rig, &info);
   t->grid = (cli_grid){info.width, info.height, info.channels};
-  return clt_curve_parse(info.response, &t->response, error);
+  t->panel = clt_station_rig_config(&t->config, &t->station).projector;
+  return CLT_OK;
 }
 
 static clt_status solve(task *t, clt_error *error) {
@@ -82,7 +80,7 @@ static clt_status solve(task *t, clt_error *error) {
     t->options.context = &t->progress;
     status = clt_optical_compensate(t->station.rig, &t->picture, &t->options, &t->drive, &t->result, error);
   }
-  return status ? status : clt_image_write(t->output, &t->response, &t->drive, error);
+  return status ? status : clt_panel_write(t->output, &t->panel, &t->drive, error);
 }
 
 static int answer(const cli_arguments *arguments, const task *t) {

@@ -19,10 +19,29 @@ static bool fits(const clt_image *image, const cli_grid *grid) {
   return image->width == grid->width && image->height == grid->height && image->channels == grid->channels;
 }
 
-clt_status cli_picture_read(const char *path, const clt_curve *curve, const cli_grid *grid, clt_image *out,
+/* A file's light at its own size. A grey picture of codes is what every channel of the panel shows. */
+static clt_status read_light(const char *path, const clt_panel *panel, int channels, clt_image *out, clt_error *error) {
+  static const clt_curve as_it_is = {.kind = CLT_CURVE_LINEAR};
+  clt_image file = {0}, codes = {0};
+  if (panel == NULL || clt_image_path_is_linear(path)) {
+    return clt_image_read(path, NULL, out, error);
+  }
+  clt_status status = clt_image_read(path, &as_it_is, &file, error);
+  if (!status) {
+    status = clt_image_convert(&file, file.channels < channels ? channels : file.channels, &codes, error);
+  }
+  if (!status) {
+    status = clt_panel_decode(panel, &codes, out, error);
+  }
+  clt_image_finish(&file);
+  clt_image_finish(&codes);
+  return status;
+}
+
+clt_status cli_picture_read(const char *path, const clt_panel *panel, const cli_grid *grid, clt_image *out,
                             clt_error *error) {
   clt_image file = {0}, resized = {0};
-  clt_status status = clt_image_read(path, curve, &file, error);
+  clt_status status = read_light(path, panel, grid->channels, &file, error);
   if (!status && ends_with(path, ".npy") && !fits(&file, grid)) {
     status = clt_fail(error, CLT_BAD_INPUT,
                       "%s holds %d x %d x %d numbers (channels x height x width) where the grid has %d x %d x %d; a "
@@ -40,9 +59,9 @@ clt_status cli_picture_read(const char *path, const clt_curve *curve, const cli_
   return status;
 }
 
-clt_status cli_drive_read(const char *path, const clt_curve *curve, const cli_grid *grid, clt_image *out,
+clt_status cli_drive_read(const char *path, const clt_panel *panel, const cli_grid *grid, clt_image *out,
                           clt_error *error) {
-  clt_status status = cli_picture_read(path, curve, grid, out, error);
+  clt_status status = cli_picture_read(path, panel, grid, out, error);
   if (status) {
     return status;
   }

@@ -3,6 +3,7 @@
 #define CLT_CLI_PICTURE_H
 
 #include "counterlight/image.h"
+#include "counterlight/panel.h"
 #include "counterlight/status.h"
 
 /* What a picture must fit: the cells and channels of a transport or a rig. */
@@ -11,12 +12,12 @@ typedef struct cli_grid {
 } cli_grid;
 
 /* Reads a picture to the grid. A .png, .jpg or .exr of any size is resampled and its channels converted; a .npy means
- * its numbers as they are and is refused (CLT_BAD_INPUT, both sizes named) where it does not fit. curve decodes .png
- * and .jpg (NULL: sRGB). out is initialised here. */
-clt_status cli_picture_read(const char *path, const clt_curve *curve, const cli_grid *grid, clt_image *out,
+ * its numbers as they are and is refused (CLT_BAD_INPUT, both sizes named) where it does not fit. A .png or
+ * .jpg is sRGB, or where a panel is given, the codes that it shows. out is initialised here. */
+clt_status cli_picture_read(const char *path, const clt_panel *panel, const cli_grid *grid, clt_image *out,
                             clt_error *error);
 /* The same for a drive: values must lie in 0..1. */
-clt_status cli_drive_read(const char *path, const clt_curve *curve, const cli_grid *grid, clt_image *out,
+clt_status cli_drive_read(const char *path, const clt_panel *panel, const cli_grid *grid, clt_image *out,
                           clt_error *error);
 
 /* CLT_BAD_INPUT where path cannot become a file: its folder is not there or not writable, or it is a folder itself.

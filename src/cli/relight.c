@@ -14,6 +14,7 @@ static const cli_option options[] = {
     {"samples", 0, "N", "montecarlo: paths of each cell (default 64)"},
     {"seed", 0, "N", "montecarlo: of the paths (default 0)"},
     {"exact-first-bounce", 0, NULL, "with --forward: F = 1 / (T^-1)_ii in place of diag(T)"},
+    {"calibration", 0, "FILE", "of the rig: the responses by which a .png drive is decoded"},
     {"scale", 0, "X", "radiance of white in a .png (default: the median direct light)"},
     {NULL, 0, NULL, NULL},
 };
@@ -21,7 +22,7 @@ static const cli_option options[] = {
 static const char notes[] =
     "Writes b0 + T x, with --dual T' x (Helmholtz reciprocity: lit from the camera, seen by the projector).\n"
     "A .png or .jpg light holds panel values and is decoded by the projector's response curve that the\n"
-    "transport file names (sRGB where it names none, and with --dual); .exr and .npy are linear.\n"
+    "transport file names (sRGB where it names none, and with --dual), or by --calibration; .exr and .npy are linear.\n"
     "With --forward l_out = (I - A)^-1 F x comes by the series, the iteration or the paths of Bai et al. 2010 (eq. "
     "14,\n"
     "41, 46), and how far it is from T x is told; montecarlo inverts T (at most 6400 lit cells) and tells its "
@@ -53,8 +54,11 @@ static clt_status read_options(const cli_command *command, const cli_arguments *
 }
 
 static clt_status relight(task *t, clt_error *error) {
-  const clt_curve *curve = t->dual ? NULL : &t->input.response;
-  clt_status status = cli_picture_read(t->light, curve, &t->input.grid, &t->drive, error);
+  const clt_panel *panel = t->dual ? NULL : &t->input.panel;
+  clt_status status = t->dual ? CLT_OK : cli_input_check_drive(&t->input, t->light, error);
+  if (!status) {
+    status = cli_picture_read(t->light, panel, &t->input.grid, &t->drive, error);
+  }
   if (status) {
     return status;
   }
@@ -99,6 +103,9 @@ static int run(const cli_command *command, const cli_arguments *arguments) {
   clt_status status = read_options(command, arguments, &t, &error);
   if (!status) {
     status = cli_input_open(arguments->positional[0], &t.input, &error);
+  }
+  if (!status) {
+    status = cli_input_calibrate(cli_value(command, arguments, "calibration"), &t.input, &error);
   }
   if (!status) {
     status = relight(&t, &error);

@@ -19,7 +19,7 @@ static const cli_option options[] = {
 static const char notes[] =
     "Computes Table 1 and Figs. 5 to 13 of Bai et al. 2010 again, and leaves in DIR reproduce.html, which sets the\n"
     "report's numbers beside these, and each figure as .csv and .svg or .png. Charts need gnuplot.\n"
-    "Fig. 10 at N = 10240 takes most of the time and 4 GB; --quick stops at 1280, in seconds.\n";
+    "Fig. 10 at N = 10240 takes most of the time and 5 GB; --quick stops at 1280, in seconds.\n";
 
 static bool tell(void *context, const char *part, int done, int parts) {
   char text[64];

@@ -7,6 +7,7 @@
 #include "cli/command.h"
 #include "cli/folder.h"
 #include "cli/light_files.h"
+#include "cli/measure.h"
 #include "cli/progress.h"
 #include "counterlight/analysis.h"
 #include "counterlight/station.h"
@@ -88,11 +89,7 @@ static clt_status read_options(const cli_command *command, const cli_arguments *
 }
 
 static clt_status measure(task *t, clt_error *error) {
-  cli_progress_note(&t->progress, "opening the devices");
-  clt_status status = clt_station_open(&t->config, &t->station, error);
-  if (!status) {
-    status = clt_station_open_rig(&t->config, &t->station, NULL, error);
-  }
+  clt_status status = cli_station_open(&t->config, &t->progress, &t->station, error);
   if (status) {
     return status;
   }

@@ -117,7 +117,8 @@ static clt_status simulate(const char *path, task *t, clt_error *error) {
     status = clt_scene_pixel_map(t->station.scene, &t->map, error);
   }
   if (!status) {
-    status = cli_drive_read(t->drive_path, &t->rig.projector.response[0], &t->grid, &t->drive, error);
+    clt_panel panel = clt_panel_of_curve(&t->rig.projector.response[0]);
+    status = cli_drive_read(t->drive_path, &panel, &t->grid, &t->drive, error);
   }
   if (!status) {
     status = t->exact ? clt_scene_appearance(t->station.scene, &t->drive, &t->seen, error) : photograph(t, error);

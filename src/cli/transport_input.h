@@ -10,12 +10,17 @@ typedef struct cli_input {
   clt_transport *transport;
   clt_certificate *certificate;
   cli_grid grid;
-  clt_curve response;             /* of the projector it was measured with; sRGB where the file does not say */
+  clt_panel panel;                /* of the projector it was measured with; sRGB where the file does not say */
+  bool panel_unknown;             /* the file says only that a calibration has it */
   double white[CLT_CHANNELS_MAX]; /* median F of each channel: the radiance that white means by default */
 } cli_input;
 
 /* Loads, certifies and describes; CLT_BAD_INPUT names file and field. On failure nothing needs to be closed. */
 clt_status cli_input_open(const char *path, cli_input *input, clt_error *error);
+/* Takes the panel of a calibration file (NULL: leaves it as it is). */
+clt_status cli_input_calibrate(const char *path, cli_input *input, clt_error *error);
+/* CLT_BAD_INPUT where path would hold panel values and the panel is not known. */
+clt_status cli_input_check_drive(const cli_input *input, const char *path, clt_error *error);
 void cli_input_close(cli_input *input);
 
 /* The white of every channel as the certificate has it; 1 where a channel has no lit cell. */

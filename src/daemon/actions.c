@@ -83,18 +83,6 @@ static void solve(control *self) {
   }
 }
 
-/* The panel as well as it is known. */
-static clt_panel panel(const control *self) {
-  clt_panel known = self->found.devices.panel;
-  clt_curve curve;
-  if (self->found.calibrated && clt_curve_parse(self->found.response, &curve, NULL) == CLT_OK) {
-    for (int c = 0; c < CLT_PANEL_CHANNELS; c++) {
-      known.response[c] = curve;
-    }
-  }
-  return known;
-}
-
 static void show(control *self) {
   output_drive *letter = clt_alloc(1, sizeof *letter);
   clt_error error = {0};
@@ -103,7 +91,7 @@ static void show(control *self) {
     free(letter);
     return;
   }
-  letter->panel = panel(self);
+  letter->panel = self->found.devices.panel;
   clt_mailbox_put(self->boxes->drives, letter);
 }
 

@@ -57,7 +57,7 @@ static void fill_content(control *self, solver_job *job) {
 
 static clt_status fill_snapshot(control *self, solver_job *job, clt_error *error) {
   self->work.snapshot_ticket = self->wishes.snapshot_ticket;
-  snprintf(job->response, sizeof job->response, "%s", self->found.response);
+  job->panel = self->found.devices.panel;
   clt_status status = daemon_picture_copy(&self->found.picture, &job->picture, error);
   return status == CLT_OK ? daemon_image_copy(&self->found.observation, &job->observation, error) : status;
 }

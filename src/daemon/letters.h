@@ -182,7 +182,7 @@ typedef struct solver_job {
   char configured[CLT_PATH_MAX]; /* CONTENT: what the configuration names */
   int width, height, channels;   /* PREPARE: the panel; LOAD, SOLVE: the grid */
   char source[CLT_TEXT_MAX];     /* LOAD: the rig */
-  char response[32];             /* SNAPSHOT */
+  clt_panel panel;               /* SNAPSHOT */
   char method[24];               /* SOLVE, ADOPT */
   double tolerance, deadline_s;
   clt_white white;

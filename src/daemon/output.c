@@ -70,18 +70,6 @@ static void encode_drive(output *main) {
   output_encode(main->drive, &main->panel, main->codes);
 }
 
-/* The panel before the rig tells: with the configuration's response, or as the scene suggests. */
-static clt_panel known_panel(const output *main, const clt_station_config *config) {
-  clt_rig_config suggested = config->rig;
-  if (main->station.scene != NULL) {
-    clt_scene_rig_config(main->station.scene, &suggested);
-  }
-  for (int c = 0; c < CLT_PANEL_CHANNELS && config->projector_response_given; c++) {
-    suggested.projector.response[c] = config->rig.projector.response[c];
-  }
-  return suggested.projector;
-}
-
 static void report_opened(output *main, const clt_error *error) {
   output_opened *letter = clt_alloc(1, sizeof *letter);
   if (letter == NULL) {
@@ -103,7 +91,7 @@ static void open_station(output *main, const clt_station_config *config) {
   if (!main->open && clt_station_open(config, &main->station, &error) == CLT_OK) {
     main->open = true;
     main->station.projector->driver->describe(main->station.projector, &main->panel);
-    main->known = known_panel(main, config);
+    main->known = clt_station_rig_config(config, &main->station).projector;
     encode_drive(main);
   }
   if (error.status != CLT_OK) {

@@ -201,14 +201,12 @@ static clt_status write_radiance(const solver *self, const clt_image *radiance, 
 
 static clt_status snapshot(solver *self, solver_job *job, solver_result *result) {
   char folder[CLT_PATH_MAX], path[CLT_PATH_MAX];
-  clt_curve response = {0};
   clt_error *error = &result->error;
   const daemon_picture *picture = &job->picture;
   clt_status status = store_path(self->state, "snapshot", folder, error);
   status = status == CLT_OK ? clt_place_make_folder(folder, 0750, error) : status;
-  status = status == CLT_OK ? clt_curve_parse(job->response, &response, error) : status;
   status = status == CLT_OK ? store_path(self->state, "snapshot/drive.png", path, error) : status;
-  status = status == CLT_OK ? clt_image_write(path, &response, &picture->drive, error) : status;
+  status = status == CLT_OK ? clt_panel_write(path, &job->panel, &picture->drive, error) : status;
   if (status == CLT_OK && picture->target.data != NULL) {
     status = write_radiance(self, &picture->target, picture->white, "snapshot/target.png", error);
   }

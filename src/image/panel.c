@@ -105,3 +105,39 @@ void clt_panel_encode(const clt_panel *panel, const clt_image *drive, int channe
     }
   }
 }
+
+clt_status clt_panel_decode(const clt_panel *panel, const clt_image *codes, clt_image *light, clt_error *error) {
+  clt_status status = clt_image_init(light, codes->channels, codes->height, codes->width, error);
+  if (status != CLT_OK) {
+    return status;
+  }
+  size_t plane = (size_t)codes->width * (size_t)codes->height;
+  bool mixes = panel->mixes && codes->channels == N;
+  for (size_t i = 0; i < plane; i++) {
+    double own[N];
+    for (int k = 0; k < codes->channels && k < N; k++) {
+      own[k] = clt_curve_decode(&panel->response[k], codes->data[(size_t)k * plane + i]);
+    }
+    for (int c = 0; c < codes->channels && c < N; c++) {
+      const double *row = panel->crosstalk[c];
+      light->data[(size_t)c * plane + i] =
+          (float)(mixes ? row[0] * own[0] + row[1] * own[1] + row[2] * own[2] : own[c]);
+    }
+  }
+  return CLT_OK;
+}
+
+clt_status clt_panel_write(const char *path, const clt_panel *panel, const clt_image *drive, clt_error *error) {
+  static const clt_curve as_it_is = {.kind = CLT_CURVE_LINEAR};
+  if (clt_image_path_is_linear(path)) {
+    return clt_image_write(path, NULL, drive, error);
+  }
+  clt_image codes = {0};
+  clt_status status = clt_image_init(&codes, drive->channels, drive->height, drive->width, error);
+  if (status == CLT_OK) {
+    clt_panel_encode(panel, drive, drive->channels, drive->height, drive->width, codes.data);
+    status = clt_image_write(path, &as_it_is, &codes, error);
+  }
+  clt_image_finish(&codes);
+  return status;
+}

@@ -55,9 +55,10 @@ void clt_merge_finish(clt_merge *merge) {
 }
 
 /* Means of a footprint's samples; weight is NULL where all count alike. n samples of weights w tell as much as
- * (sum w)^2 / sum w^2 alike ones. */
+ * (sum w)^2 / sum w^2 alike ones. Pixels of a weighted footprint see unlike light, so that the mean of those which
+ * do not saturate would be too dark: whole leaves such an exposure out. */
 static clt_merge_sum sum_footprint(const clt_merge *merge, const uint16_t *samples, const int32_t *pixel,
-                                   const float *weight, int64_t count) {
+                                   const float *weight, int64_t count, bool whole) {
   int channels = merge->camera.channels;
   float light = 0, unsaturated = 0, squares = 0, raw = 0, all = 0;
   for (int64_t p = 0; p < count; p++) {
@@ -72,7 +73,7 @@ static clt_merge_sum sum_footprint(const clt_merge *merge, const uint16_t *sampl
     }
   }
   raw /= all;
-  if (unsaturated == 0 || raw >= merge->full) {
+  if (unsaturated == 0 || raw >= merge->full || (whole && unsaturated < all)) {
     return (clt_merge_sum){.raw = raw};
   }
   return (clt_merge_sum){.light = light / unsaturated, .count = unsaturated * unsaturated / squares, .raw = raw};
@@ -83,13 +84,14 @@ void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame) {
   int channels = merge->camera.channels;
   clt_merge_sum *sums = merge->sums + (size_t)exposure * (size_t)channels * footprints->cells;
   merge->seconds[exposure] = frame->exposure_s;
+  bool whole = footprints->weight != NULL && exposure > 0; /* the shortest bears with a defective pixel */
 #pragma omp parallel for schedule(static) if (footprints->cells >= WORTH_SHARING)
   for (size_t i = 0; i < footprints->cells; i++) {
     int64_t first = footprints->start[i], count = footprints->start[i + 1] - first;
     const float *weight = footprints->weight != NULL ? footprints->weight + first : NULL;
     for (int c = 0; c < channels; c++) {
       sums[(size_t)c * footprints->cells + i] =
-          count > 0 ? sum_footprint(merge, frame->samples + c, footprints->pixel + first, weight, count)
+          count > 0 ? sum_footprint(merge, frame->samples + c, footprints->pixel + first, weight, count, whole)
                     : (clt_merge_sum){0};
     }
   }

@@ -25,7 +25,7 @@ static bool shows_picture(clt_camera_rig *rig, const clt_frame *frame) {
 /* Every frame that was refused, for messages. */
 static clt_status fail_with_numbers(const clt_camera_rig *rig, const char *what, clt_error *error) {
   const clt_shots *shots = &rig->shots;
-  return clt_fail(error, CLT_FAILED,
+  return clt_fail(error, CLT_TIMEOUT,
                   "picture %ld: %s; of %ld frames so far %ld repeated the one before, %ld were of another picture and "
                   "%ld contradicted the others: check the camera's connection, and the latency of %.4g ms",
                   shots->shown, what, shots->frames + shots->stuck, shots->stuck, rig->strange, rig->torn,

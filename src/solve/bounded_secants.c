@@ -15,8 +15,8 @@ void clt_secants_open(clt_secants *model, const clt_box *box, size_t first) {
   model->rest = clt_system_vector(box->system, first + 1);
   model->open = clt_system_vector(box->system, first + 2);
   for (size_t k = 0; k < CLT_SECANTS; k++) {
-    model->v[k] = clt_system_vector(box->system, first + 3 + 2 * k);
-    model->y[k] = clt_system_vector(box->system, first + 4 + 2 * k);
+    model->v[k] = clt_system_vector(box->system, first + 3 + k);
+    model->y[k] = clt_system_vector(box->system, first + 3 + CLT_SECANTS + k);
   }
 }
 

@@ -3,6 +3,7 @@
 #include "solve/method.h"
 
 static const double STALE_FACTOR = 0.9; /* a cycle that leaves more than this of the residual gains nothing */
+static const double LITTLE = 0.1;       /* of a vector: what is left of it may have lost a digit of its orthogonality */
 enum { STALE_CYCLES = 2 };
 
 /* The least-squares problem min ||norm e_1 - H y|| of a cycle, H reduced to triangular by Givens rotations. */
@@ -16,22 +17,25 @@ static double *basis_vector(const clt_gmres *gmres, int index) {
   return gmres->basis + (size_t)index * gmres->stride;
 }
 
-/* v_(k+1) = A v_k made orthogonal to v_0..v_k: modified Gram-Schmidt, twice, so that it stays so in double. */
+/* v_(k+1) = A v_k made orthogonal to v_0..v_k: modified Gram-Schmidt, and once more where little is left, so that it
+ * stays so in double. */
 static double extend_basis(const clt_gmres *gmres, int k, double *column) {
   double *next = basis_vector(gmres, k + 1);
   gmres->apply(gmres->context, basis_vector(gmres, k), next);
   for (int i = 0; i <= k; i++) {
     column[i] = 0;
   }
-  for (int pass = 0; pass < 2; pass++) {
+  double before = 0, left = clt_norm(gmres->count, next);
+  for (int pass = 0; pass < 2 && (pass == 0 || left < LITTLE * before); pass++) {
+    before = left;
     for (int i = 0; i <= k; i++) {
       double part = clt_dot(gmres->count, basis_vector(gmres, i), next);
       clt_add(gmres->count, -part, basis_vector(gmres, i), next);
       column[i] += part;
     }
+    left = clt_norm(gmres->count, next);
   }
-  column[k + 1] = clt_norm(gmres->count, next);
-  return column[k + 1];
+  return column[k + 1] = left;
 }
 
 static void rotate(triangle *t, int k) {
@@ -80,7 +84,10 @@ void clt_gmres_cycle(const clt_gmres *gmres, clt_run *run, const double *r, doub
     if (!(length > 1e-14 * before)) {
       break; /* the Krylov space is complete */
     }
-    cblas_dscal((blasint)gmres->count, 1 / length, basis_vector(gmres, k), 1);
+    double *next = basis_vector(gmres, k);
+    for (size_t i = 0; i < gmres->count; i++) {
+      next[i] *= 1 / length;
+    }
   }
   add_solution(gmres, &t, k, x);
 }

@@ -23,12 +23,7 @@ static void begin(refinement *state) {
   state->best = clt_system_vector(system, 3);
   clt_copy(system->cols, system->light, state->l);
   clt_copy(system->cols, system->light, state->best);
-  if (clt_norm(system->cols, state->l) > 0) {
-    state->norm = clt_system_residual(system, state->l, state->r);
-  } else {
-    clt_copy(system->rows, system->wanted, state->r);
-    state->norm = system->wanted_norm;
-  }
+  state->norm = clt_system_residual(system, state->l, state->r);
   state->least = state->start = state->norm;
   clt_run_open(state->run, state->norm);
 }

@@ -139,7 +139,19 @@ void clt_system_apply_transposed(clt_system *system, const double *r, double *ou
   system->products++;
 }
 
+static bool is_zero(size_t count, const double *values) {
+  size_t i = 0;
+  while (i < count && values[i] == 0) {
+    i++;
+  }
+  return i == count;
+}
+
 double clt_system_residual(clt_system *system, const double *l, double *r) {
+  if (is_zero(system->cols, l)) {
+    clt_copy(system->rows, system->wanted, r);
+    return system->wanted_norm;
+  }
   clt_system_apply(system, l, r);
   for (size_t i = 0; i < system->rows; i++) {
     r[i] = system->wanted[i] - r[i];

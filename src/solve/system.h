@@ -59,21 +59,16 @@ double *clt_system_vector(const clt_system *system, size_t index);
 void clt_system_apply(clt_system *system, const double *l, double *out);
 /* out = S' r: rows values to cols values. */
 void clt_system_apply_transposed(clt_system *system, const double *r, double *out);
-/* r = b - S l; returns ||r||. */
+/* r = b - S l; returns ||r||. Without a product where l = 0, as at a cold start. */
 double clt_system_residual(clt_system *system, const double *l, double *r);
 /* r = b - T x over lit rows, of any drive x. */
 void clt_system_drive_residual(clt_system *system, const double *drive, double *r);
 
-static inline double clt_dot(size_t count, const double *a, const double *b) {
-  return cblas_ddot((blasint)count, a, 1, b, 1);
-}
-static inline double clt_norm(size_t count, const double *a) {
-  return cblas_dnrm2((blasint)count, a, 1);
-}
+/* Sums in a fixed order by the thread that calls. */
+double clt_dot(size_t count, const double *a, const double *b);
+double clt_norm(size_t count, const double *a);
 /* y += factor x */
-static inline void clt_add(size_t count, double factor, const double *x, double *y) {
-  cblas_daxpy((blasint)count, factor, x, 1, y, 1);
-}
+void clt_add(size_t count, double factor, const double *x, double *y);
 static inline void clt_copy(size_t count, const double *from, double *to) {
   memcpy(to, from, count * sizeof *to);
 }

@@ -13,10 +13,11 @@
 #include "base/random.h"
 #include "solve/refine.h"
 #include "solve/wavelet_form.h"
+#include "transport/kernels.h"
 
-enum { SKETCH = 32, SKETCH_SEED = 7 };
+enum { SKETCH = 32, SKETCH_SEED = 7, WORTH_SHARING = 8192 /* cells from which threads pay */ };
 static const double CONFIDENCE = 1.64; /* sqrt(32 / 11.98), the .001 quantile of chi^2 with 32 degrees of freedom */
-static const double FORM_SHARE = 0.6, INNER_SHARE = 0.2; /* of the tolerance */
+static const double FORM_SHARE = 0.7, INNER_SHARE = 0.2; /* of the tolerance */
 static const double FINEST = 1e-3;                       /* below, products with T are worth more than coefficients */
 
 typedef struct wavelet {
@@ -121,15 +122,18 @@ static double bound(void *context, const double *l, double norm) {
   for (size_t i = 0; i < of->cells; i++) {
     left[of->bucket[i] % SKETCH] += sign_of(of, i) * of->system->wanted[i];
   }
-  for (size_t k = 0; k < SKETCH; k++) {
-    const float *row = of->sketch + k * of->cells;
-    double even = 0, odd = 0;
-    size_t j = 0;
-    for (; j + 2 <= of->cells; j += 2) {
-      even += (double)row[j] * l[j];
-      odd += (double)row[j + 1] * l[j + 1];
+  const clt_plain_kernels *kernels = clt_plain_choose();
+#pragma omp parallel for schedule(static) if (of->cells >= WORTH_SHARING)
+  for (size_t k = 0; k < SKETCH; k += CLT_PLAIN_ROWS) {
+    const float *row[CLT_PLAIN_ROWS];
+    double sum[CLT_PLAIN_ROWS];
+    for (size_t r = 0; r < CLT_PLAIN_ROWS; r++) {
+      row[r] = of->sketch + (k + r) * of->cells;
     }
-    left[k] -= even + odd + (j < of->cells ? (double)row[j] * l[j] : 0);
+    kernels->dot_float(row, l, of->cells, sum);
+    for (size_t r = 0; r < CLT_PLAIN_ROWS; r++) {
+      left[k + r] -= sum[r];
+    }
   }
   return CONFIDENCE * clt_norm(SKETCH, left);
 }

@@ -9,12 +9,12 @@
 #include "solve/matrix.h"
 
 enum {
-  PROBES = 12,  /* at most; 1 and signs at scales up to 2^10 */
-  BUCKETS = 64, /* of magnitudes, BUCKETS_PER_OCTAVE to a factor of 2, from 2^LEAST_EXPONENT up */
-  BUCKETS_PER_OCTAVE = 2,
+  PROBES = 12,   /* at most; 1 and signs at scales up to 2^10 */
+  BUCKETS = 128, /* of magnitudes, BUCKETS_PER_OCTAVE to a factor of 2, from 2^LEAST_EXPONENT up */
+  BUCKETS_PER_OCTAVE = 4,
   LEAST_EXPONENT = -27,
   TILE = 64,              /* rows and columns that a transposition takes up at once */
-  WORTH_SHARING = 1 << 20 /* coefficients from which threads pay */
+  WORTH_SHARING = 1 << 17 /* coefficients from which threads pay */
 };
 
 /* What is needed only while a form is made. */
@@ -128,13 +128,13 @@ static void fill_probes(const clt_wavelet_form *form, making *work, const clt_sy
   }
 }
 
-/* The magnitude step of a coefficient, from its exponent and the first bit of its mantissa. */
+/* The magnitude step of a coefficient, from its exponent and the first two bits of its mantissa. */
 static size_t bucket_of(float value) {
   union {
     float value;
     uint32_t bits;
   } as = {value};
-  int step = (int)((as.bits & 0x7fffffffu) >> 22) - BUCKETS_PER_OCTAVE * (127 + LEAST_EXPONENT);
+  int step = (int)((as.bits & 0x7fffffffu) >> 21) - BUCKETS_PER_OCTAVE * (127 + LEAST_EXPONENT);
   return step < 0 ? 0 : step < BUCKETS ? (size_t)step : BUCKETS - 1;
 }
 
@@ -191,40 +191,88 @@ static size_t choose_bucket(const making *work, double wanted, double *error) {
   return bucket;
 }
 
-static clt_status keep_large(clt_wavelet_form *form, const making *work, size_t least, clt_error *error) {
-  size_t cells = work->cells, kept = 0;
+/* How many of each row are kept, and the square of what is not. */
+static double count_large(const making *work, size_t least, size_t *length) {
+  size_t cells = work->cells;
   double squares = 0;
-  for (size_t i = 0; i < cells * cells; i++) {
-    bool keep = bucket_of(work->entries[i]) >= least;
-    kept += keep;
-    squares += keep ? 0 : (double)work->entries[i] * (double)work->entries[i];
-  }
-  form->dropped = sqrt(squares);
-  form->column = clt_alloc(kept, sizeof *form->column);
-  form->value = clt_alloc(kept, sizeof *form->value);
-  if (form->column == NULL || form->value == NULL) {
-    return clt_fail(error, CLT_FAILED, "wavelet: not enough memory for %zu coefficients; use pcg or gmres", kept);
-  }
-  for (size_t i = 0, next = 0; i < cells; i++) {
+  for (size_t i = 0; i < cells; i++) {
     for (size_t j = 0; j < cells; j++) {
       float value = work->entries[i * cells + j];
-      if (bucket_of(value) >= least) {
+      bool keep = bucket_of(value) >= least;
+      length[i] += keep;
+      squares += keep ? 0 : (double)value * (double)value;
+    }
+  }
+  return squares;
+}
+
+/* Rows by their length, the longest first, by counting; places: cells + 1 zeros. */
+static void order_rows(clt_wavelet_form *form, const size_t *length, size_t *places) {
+  size_t cells = form->cells, before = 0;
+  for (size_t i = 0; i < cells; i++) {
+    places[cells - length[i]]++;
+    form->kept += length[i];
+  }
+  for (size_t k = 0; k <= cells; k++) {
+    size_t count = places[k];
+    places[k] = before;
+    before += count;
+  }
+  for (size_t i = 0; i < cells; i++) {
+    form->row[places[cells - length[i]]++] = (uint32_t)i;
+  }
+  for (size_t place = cells; place < form->slices * CLT_WAVELET_SLICE; place++) {
+    form->row[place] = (uint32_t)cells;
+  }
+  for (size_t slice = 0; slice < form->slices; slice++) {
+    size_t longest = length[form->row[slice * CLT_WAVELET_SLICE]];
+    form->first[slice + 1] = form->first[slice] + longest * CLT_WAVELET_SLICE;
+  }
+}
+
+static void fill_slices(clt_wavelet_form *form, const making *work, size_t least) {
+  size_t cells = form->cells;
+#pragma omp parallel for schedule(dynamic, 16)
+  for (size_t place = 0; place < cells; place++) {
+    size_t next = form->first[place / CLT_WAVELET_SLICE] + place % CLT_WAVELET_SLICE;
+    const float *from = work->entries + form->row[place] * cells;
+    for (size_t j = 0; j < cells; j++) {
+      if (bucket_of(from[j]) >= least) {
         form->column[next] = (uint16_t)j;
-        form->value[next++] = value;
+        form->value[next] = from[j];
+        next += CLT_WAVELET_SLICE;
       }
     }
-    form->first[i + 1] = next;
   }
+}
+
+static clt_status keep_large(clt_wavelet_form *form, const making *work, size_t least, clt_error *error) {
+  size_t cells = work->cells, *length = clt_alloc(2 * cells + 1, sizeof *length);
+  if (length == NULL) {
+    return clt_fail(error, CLT_FAILED, "wavelet: not enough memory for the lengths of %zu rows", cells);
+  }
+  form->dropped = sqrt(count_large(work, least, length));
+  order_rows(form, length, length + cells);
+  free(length);
+  form->column = clt_alloc(form->first[form->slices], sizeof *form->column);
+  form->value = clt_alloc(form->first[form->slices], sizeof *form->value);
+  if (form->column == NULL || form->value == NULL) {
+    return clt_fail(error, CLT_FAILED, "wavelet: not enough memory for %zu coefficients; use pcg or gmres", form->kept);
+  }
+  fill_slices(form, work, least);
   return CLT_OK;
 }
 
 static clt_status reserve(clt_wavelet_form *form, making *work, clt_error *error) {
   size_t cells = work->cells, threads = (size_t)omp_get_max_threads();
-  form->first = clt_alloc(cells + 1, sizeof *form->first);
+  form->slices = (cells + CLT_WAVELET_SLICE - 1) / CLT_WAVELET_SLICE;
+  form->first = clt_alloc(form->slices + 1, sizeof *form->first);
+  form->row = clt_alloc(form->slices, CLT_WAVELET_SLICE * sizeof *form->row);
   work->entries = clt_alloc(cells * cells, sizeof *work->entries);
   work->probes = clt_alloc(cells, PROBES * sizeof *work->probes);
   work->scratch = clt_alloc(2 * cells, threads * sizeof *work->scratch);
-  return form->first != NULL && work->entries != NULL && work->probes != NULL && work->scratch != NULL
+  return form->first != NULL && form->row != NULL && work->entries != NULL && work->probes != NULL &&
+                 work->scratch != NULL
              ? CLT_OK
              : clt_fail(error, CLT_FAILED, "wavelet: not enough memory for %zu x %zu entries; use pcg or gmres", cells,
                         cells);
@@ -270,20 +318,26 @@ clt_status clt_wavelet_form_init(clt_wavelet_form *form, const clt_system *syste
 
 void clt_wavelet_form_finish(clt_wavelet_form *form) {
   free(form->first);
+  free(form->row);
   free(form->column);
   free(form->value);
   *form = (clt_wavelet_form){0};
 }
 
 void clt_wavelet_form_apply(const clt_wavelet_form *form, const double *c, double *out) {
-#pragma omp parallel for schedule(static) if (form->first[form->cells] >= WORTH_SHARING)
-  for (size_t i = 0; i < form->cells; i++) {
-    size_t k = form->first[i], end = form->first[i + 1];
-    double even = 0, odd = 0;
-    for (; k + 2 <= end; k += 2) {
-      even += (double)form->value[k] * c[form->column[k]];
-      odd += (double)form->value[k + 1] * c[form->column[k + 1]];
+#pragma omp parallel for schedule(static, 16) if (form->kept >= WORTH_SHARING)
+  for (size_t slice = 0; slice < form->slices; slice++) {
+    double sum[CLT_WAVELET_SLICE] = {0};
+    for (size_t k = form->first[slice]; k < form->first[slice + 1]; k += CLT_WAVELET_SLICE) {
+      for (size_t l = 0; l < CLT_WAVELET_SLICE; l++) {
+        sum[l] += (double)form->value[k + l] * c[form->column[k + l]];
+      }
     }
-    out[i] = even + odd + (k < end ? (double)form->value[k] * c[form->column[k]] : 0);
+    for (size_t l = 0; l < CLT_WAVELET_SLICE; l++) {
+      size_t row = form->row[slice * CLT_WAVELET_SLICE + l];
+      if (row < form->cells) {
+        out[row] = sum[l];
+      }
+    }
   }
 }

@@ -12,19 +12,27 @@
 #include "solve/daubechies.h"
 #include "solve/system.h"
 
+/* The rows of M stand in slices of rows that hold about as many coefficients (the longest first), the k-th of each side
+ * by side, so that a product neither waits for sums nor guesses where a row ends. Zeros fill up the shorter ones. */
+enum { CLT_WAVELET_SLICE = 8 };
+
 typedef struct clt_wavelet_form {
   clt_d4 d4;
-  size_t cells;     /* of the grid, and rows and columns of M */
-  size_t *first;    /* coefficient at which a row of M begins; cells + 1 values */
-  uint16_t *column; /* of each coefficient that is kept */
+  size_t cells; /* of the grid, and rows and columns of M */
+  size_t kept;  /* coefficients */
+  size_t slices;
+  size_t *first;    /* place at which a slice begins; slices + 1 values */
+  uint32_t *row;    /* of each place in a slice: its row of M; `cells` behind the last; slices * CLT_WAVELET_SLICE */
+  uint16_t *column; /* of each place; first[slices] */
   float *value;
   double dropped; /* Frobenius norm of what is left out: ||R x - W' M W x|| <= dropped ||x||, up to float's rounding */
   double error;   /* the worst ||R z - W' M W z|| / ||z|| over the probes z */
 } clt_wavelet_form;
 
 /* Transforms R of the selected channel and leaves out as many of its small coefficients as keep `error` at most
- * `wanted`, in magnitude steps of sqrt 2. The probes are 1 and random signs on blocks of 1, 2, 4, .. cells.
- * CLT_BAD_INPUT beyond CLT_MATRIX_CELLS_MAX cells. The caller zeroed the form, and finishes it in either case. */
+ * `wanted`, in magnitude steps of a quarter of an octave. The probes are 1 and random signs on blocks of 1, 2, 4, ..
+ * cells. CLT_BAD_INPUT beyond CLT_MATRIX_CELLS_MAX cells. The caller zeroed the form, and finishes it in either case.
+ */
 clt_status clt_wavelet_form_init(clt_wavelet_form *form, const clt_system *system, double wanted, clt_error *error);
 void clt_wavelet_form_finish(clt_wavelet_form *form);
 /* out = M c, both in coefficients. */

@@ -1,5 +1,7 @@
 /* Dense storage in single precision. */
 #define REAL float
+#define DOT dot_float
+#define ADD add_float
 #include "transport/check.h"
 #include "transport/dense_plain.h"
 

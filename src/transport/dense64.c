@@ -1,5 +1,7 @@
 /* Dense storage in double precision. */
 #define REAL double
+#define DOT dot_double
+#define ADD add_double
 #include "transport/check.h"
 #include "transport/dense_plain.h"
 

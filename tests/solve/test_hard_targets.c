@@ -61,7 +61,8 @@ static void check_feasible(const char *storage, uint64_t seed) {
   hard held = hard_hold(room_cube(5, .8, .5, seed), storage, seed);
   room_ask(&held.room, seed, .02, .98);
   double *unbounded = room_numbers(held.room.cells);
-  assert_string_equal(hard_solve_by(&held, "auto", 1e-9).method, "pcg");
+  clt_solve_result linear = hard_solve_by(&held, "auto", 1e-9);
+  assert_true(linear.converged && strcmp(linear.method, "bounded") != 0);
   memcpy(unbounded, held.room.x, held.room.cells * sizeof *unbounded);
   assert_true(hard_solve_by(&held, "bounded", 1e-9).converged);
   assert_true(room_distance(held.room.x, unbounded, held.room.cells) <= 1e-7);
@@ -197,7 +198,8 @@ static void check_asymmetric(const char *storage, uint64_t seed) {
   assert_true(hard_residual(&held) <= 1.01e-8);
   assert_true(clt_certificate_channel(held.certificate, 0)->reciprocity > CLT_RECIPROCAL);
   room_wanted(&held.room, seed, .1, .9, held.room.known, held.room.b);
-  assert_string_equal(hard_solve_by(&held, "auto", 1e-8).method, "gmres");
+  clt_solve_result taken = hard_solve_by(&held, "auto", 1e-8);
+  assert_null(strstr(taken.method, "pcg"));
   assert_true(hard_residual(&held) <= 1.01e-8);
   hard_free(&held);
 }

@@ -183,8 +183,8 @@ static void a_product_stays_within_its_bounds(void **state) {
       clt_wavelet_form form = {0};
       assert_ok(clt_wavelet_form_init(&form, &system, wanted[k], &error), error);
       assert_product_within_bounds(&form, &room, wanted[k]);
-      assert_true(form.first[form.cells] > before);
-      before = form.first[form.cells];
+      assert_true(form.kept > before);
+      before = form.kept;
       clt_wavelet_form_finish(&form);
     }
     clt_system_finish(&system);
@@ -198,7 +198,7 @@ static double count_per_row(const test_room *room) {
   clt_system system = system_of(room);
   clt_wavelet_form form = {0};
   assert_ok(clt_wavelet_form_init(&form, &system, .01, &error), error);
-  double per_row = (double)form.first[form.cells] / (double)form.cells;
+  double per_row = (double)form.kept / (double)form.cells;
   print_message("%zu x %zu: %.1f coefficients a row, %.1f %% of the matrix, product error %.2g, dropped %.2g\n",
                 form.d4.width, form.d4.height, per_row, 100 * per_row / (double)form.cells, form.error, form.dropped);
   clt_wavelet_form_finish(&form);

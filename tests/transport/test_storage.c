@@ -172,6 +172,44 @@ static void test_half_variants(void **unused) {
   assert_true(clt_half_choose()->runs_here());
 }
 
+static void test_plain_variants(void **unused) {
+  (void)unused;
+  enum { MOST = 1024 };
+  static float single[4][MOST];
+  static double exact[4][MOST], x[MOST], first[2][MOST], other[MOST];
+  uint64_t state = 5;
+  const float *const floats[] = {single[0] + 1, single[1], single[2], single[3]};
+  const double *const doubles[] = {exact[0] + 1, exact[1], exact[2], exact[3]};
+  const double y[4] = {0.3, -0.7, 0, 1.1};
+  for (size_t count = 0; count < MOST; count += count < 70 ? 1 : 119) {
+    for (size_t k = 0; k < MOST; k++) {
+      x[k] = first[0][k] = first[1][k] = test_random(&state) - 0.5;
+      for (int r = 0; r < 4; r++) {
+        exact[r][k] = (test_random(&state) - 0.1) * exp(20 * test_random(&state) - 10);
+        single[r][k] = (float)exact[r][k];
+      }
+    }
+    double wanted[2][4], sum[4];
+    clt_plain_variants[0]->dot_float(floats, x, count, wanted[0]);
+    clt_plain_variants[0]->dot_double(doubles, x, count, wanted[1]);
+    clt_plain_variants[0]->add_float(floats, y, count, first[0]);
+    clt_plain_variants[0]->add_double(doubles, y, count, first[1]);
+    for (size_t v = 1; clt_plain_variants[v] != NULL && clt_plain_variants[0]->runs_here(); v++) {
+      clt_plain_variants[v]->dot_float(floats, x, count, sum);
+      assert_memory_equal(sum, wanted[0], sizeof sum);
+      clt_plain_variants[v]->dot_double(doubles, x, count, sum);
+      assert_memory_equal(sum, wanted[1], sizeof sum);
+      memcpy(other, x, sizeof other);
+      clt_plain_variants[v]->add_float(floats, y, count, other);
+      assert_memory_equal(other, first[0], sizeof other);
+      memcpy(other, x, sizeof other);
+      clt_plain_variants[v]->add_double(doubles, y, count, other);
+      assert_memory_equal(other, first[1], sizeof other);
+    }
+  }
+  assert_true(clt_plain_choose()->runs_here());
+}
+
 static void test_byte_variants(void **unused) {
   (void)unused;
   enum { MOST = 1024, BLOCKS = MOST / CLT_BLOCK };
@@ -426,12 +464,17 @@ static void test_compensation(void **unused) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_entries),       cmocka_unit_test(test_products),
-      cmocka_unit_test(test_thread_count),  cmocka_unit_test(test_half_variants),
-      cmocka_unit_test(test_byte_variants), cmocka_unit_test(case_18_fp16_subnormal_and_overflow),
-      cmocka_unit_test(test_half_codes),    cmocka_unit_test(test_refusals),
-      cmocka_unit_test(test_from_tree),     cmocka_unit_test(case_19_sums_of_131072_terms),
-      cmocka_unit_test(test_compensation)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_entries),
+                                     cmocka_unit_test(test_products),
+                                     cmocka_unit_test(test_thread_count),
+                                     cmocka_unit_test(test_half_variants),
+                                     cmocka_unit_test(test_plain_variants),
+                                     cmocka_unit_test(test_byte_variants),
+                                     cmocka_unit_test(case_18_fp16_subnormal_and_overflow),
+                                     cmocka_unit_test(test_half_codes),
+                                     cmocka_unit_test(test_refusals),
+                                     cmocka_unit_test(test_from_tree),
+                                     cmocka_unit_test(case_19_sums_of_131072_terms),
+                                     cmocka_unit_test(test_compensation)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
