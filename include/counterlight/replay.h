@@ -4,8 +4,8 @@
  * properties and has one line a frame:
  *   frame SEQUENCE PATTERN HASH SHOWN_NS EXPOSED_NS EXPOSURE_S FILE
  * SEQUENCE the camera's own count, PATTERN the number of pictures presented until then (from 1), HASH of that picture's
- * codes k, rounded to the panel's bits (h = splitmix64's finaliser of h + k + 1, from 0), SHOWN_NS when it was shown, the
- * rest as in clt_frame. */
+ * codes k, rounded to the panel's bits (h = splitmix64's finaliser of h + k + 1, from 0), SHOWN_NS when it was shown,
+ * the rest as in clt_frame. */
 #ifndef COUNTERLIGHT_REPLAY_H
 #define COUNTERLIGHT_REPLAY_H
 
@@ -34,7 +34,8 @@ CLT_PUBLIC clt_status clt_recording_open(const char *folder, clt_projector *proj
  * CLT_BAD_INPUT with file and line. Either device may be closed first. */
 CLT_PUBLIC clt_status clt_replay_open(const char *folder, clt_projector **projector, clt_camera **camera,
                                       clt_error *error);
-/* The longest exposure time among a recording's frames, s. CLT_BAD_INPUT as clt_replay_open, and where there is none. */
+/* The longest exposure time among a recording's frames, s. CLT_BAD_INPUT as clt_replay_open, and where there is none.
+ */
 CLT_PUBLIC clt_status clt_replay_longest_exposure(const char *folder, double *seconds, clt_error *error);
 /* True where the folder holds a recording. */
 CLT_PUBLIC bool clt_replay_is_recording(const char *folder);

@@ -38,7 +38,8 @@ typedef struct clt_kind {
 
 enum { CLT_WORTH_SHARING = 32768 }; /* dense entries from which threads pay */
 
-extern const clt_kind clt_kind_dense, clt_kind_dense64, clt_kind_dense16, clt_kind_dense8, clt_kind_tree, clt_kind_blocks;
+extern const clt_kind clt_kind_dense, clt_kind_dense64, clt_kind_dense16, clt_kind_dense8, clt_kind_tree,
+    clt_kind_blocks;
 
 /* Every kind, ended by NULL. */
 extern const clt_kind *const clt_kinds[];

@@ -177,8 +177,7 @@ static void the_merge_weighs_pixels(void **state) {
   assert_near(radiance.data[0], mean / 0.1 / 2, 1e-6);
   double variance = (mean / 5000 + pow(3.0 / 5000, 2) + 1.0 / FULL / FULL / 12) / alike;
   assert_near(deviation.data[0], sqrt(variance) / 0.1 / 2, 1e-6);
-  assert_near(radiance.data[1], 3000.0 / FULL / 0.1 / 2,
-              2e-6); /* without the saturated pixel */
+  assert_near(radiance.data[1], 3000.0 / FULL / 0.1 / 2, 2e-6); /* without the saturated pixel */
   clt_merge_finish(&merge);
 }
 

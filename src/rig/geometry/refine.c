@@ -6,7 +6,13 @@
 
 #include "base/memory.h"
 
-enum { RADIUS_USUAL = 3, RADIUS_MAX = 20, WINDOW_MAX = (2 * RADIUS_MAX + 1) * (2 * RADIUS_MAX + 1), LAG = 4, PASSES = 2 };
+enum {
+  RADIUS_USUAL = 3,
+  RADIUS_MAX = 20,
+  WINDOW_MAX = (2 * RADIUS_MAX + 1) * (2 * RADIUS_MAX + 1),
+  LAG = 4,
+  PASSES = 2
+};
 enum { BINS = 4096, BINS_PER_PIXEL = 64 }; /* of the histogram of pitches, panel pixels */
 #define STEEP 3.0                          /* times the usual pitch that a surface may have */
 #define SLACK 1.0                          /* panel pixels that stripes are always uncertain to */
