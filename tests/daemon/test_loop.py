@@ -78,7 +78,7 @@ def refining_corrects_the_picture_in_place():
         assert abs(read_drive(run) - drive).max() > 5, "the refined drive is not the one that is shown"
         again = verified(run)  # another photograph of the same drive says the same
         assert again["error"] < 1.2 * done["after"] and again["refined"] == done, (again, done)
-        assert run.status()["frame"]["presented"] > presented
+        wait_for("frames of the refined picture", lambda: run.status()["frame"]["presented"] > presented)
         assert refine(run)["refined"]["after"] <= 1.2 * done["after"]
         assert run.stop()[0] == 0
 

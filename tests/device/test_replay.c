@@ -164,7 +164,12 @@ static void a_recording_comes_back_sample_by_sample(void **state) {
   assert_ok(clt_replay_open(recording, &projector, &camera, &error), error);
   describe_camera(NULL, &wanted);
   camera->driver->describe(camera, &sensor);
-  assert_memory_equal(&sensor, &wanted, sizeof sensor);
+  assert_true(sensor.width == wanted.width && sensor.height == wanted.height && sensor.channels == wanted.channels);
+  assert_true(sensor.bits == wanted.bits && sensor.frame_s == wanted.frame_s);
+  assert_true(sensor.exposure_min_s == wanted.exposure_min_s && sensor.exposure_max_s == wanted.exposure_max_s);
+  assert_true(sensor.black_level == wanted.black_level && sensor.responsivity == wanted.responsivity);
+  assert_true(sensor.full_well == wanted.full_well && sensor.read_noise == wanted.read_noise);
+  assert_int_equal(sensor.own_pixels, wanted.own_pixels);
   use(projector, camera, 0.3, is);
   for (int k = 0; k < 2 * PATTERNS; k++) {
     assert_int_equal(is[k].shown_ns, was[k].shown_ns);
