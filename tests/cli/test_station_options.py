@@ -77,6 +77,14 @@ class Station(unittest.TestCase):
         answer = self.run_it(*again, self.path("x.h5"), "--record", self.path("more"), code=2)
         self.assertIn("exclude each other", answer.stderr)
 
+    def test_a_recording_holds_the_calibration_too(self):
+        scene = self.room("own.cfg", OWN)
+        self.run_it("acquire", "--scene", scene, "--record", self.path("frames"), "-o", self.path("first.h5"))
+        self.run_it("acquire", "--scene", scene, "--replay", self.path("frames"), "-o", self.path("second.h5"))
+        first, second = numbers(self.path("first.h5")), numbers(self.path("second.h5"))
+        for name in first:
+            self.assertTrue(np.array_equal(first[name], second[name]), name)
+
     def test_own_pixels_compensate_as_well_as_aligned_ones(self):
         results = {}
         for name, camera in (("aligned", ALIGNED), ("own", OWN)):

@@ -50,7 +50,8 @@ static void describe_camera(const clt_camera *camera, clt_camera_info *info) {
                             .black_level = 64,
                             .responsivity = 3.25,
                             .full_well = 8000,
-                            .read_noise = 4.5};
+                            .read_noise = 4.5,
+                            .own_pixels = true};
 }
 
 static clt_status present(clt_projector *projector, const float *codes, int64_t *shown_ns, clt_error *error) {

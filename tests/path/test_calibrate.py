@@ -113,7 +113,7 @@ class Calibrate(PathTest):
         folder, random, sequence = self.folder / "recording", np.random.default_rng(6), 0
         folder.mkdir()
         lines = ["counterlight-recording 1", "panel 64 48 1 8 0.0166",
-                 "camera 96 72 1 12 0.0333 0.0001 0.1 100 1 10000 4"]
+                 "camera 96 72 1 12 0.0333 0.0001 0.1 100 1 10000 4 1"]
         for n, light in enumerate(frames):
             shown = 10 ** 9 * (n + 1)
             for part in (0.5, 1):

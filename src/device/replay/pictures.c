@@ -170,7 +170,8 @@ static clt_status prepare(pictures *self, const char *path, clt_error *error) {
                                      .exposure_min_s = 1e-6,
                                      .exposure_max_s = 1e3,
                                      .responsivity = 1,
-                                     .full_well = 1e4};
+                                     .full_well = 1e4,
+                                     .own_pixels = true};
   }
   return status;
 }
