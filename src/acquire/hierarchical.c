@@ -16,6 +16,7 @@
 #include "acquire/row_trees.h"
 #include "acquire/session.h"
 #include "base/memory.h"
+#include "base/order.h"
 
 /* Rows split their own tree down to this part of tau: blocks that are lit anyway tell them something for nothing. */
 #define ROW_SHARE 0.25
@@ -37,11 +38,6 @@ typedef struct hierarchy {
   char phase[PHASE_MAX];
 } hierarchy;
 
-static int compare_floats(const void *left, const void *right) {
-  float a = *(const float *)left, b = *(const float *)right;
-  return (a > b) - (a < b);
-}
-
 /* The median flood of the lit cells of each channel; a channel without light takes the brightest channel's. */
 static clt_status find_scale(hierarchy *tree, clt_error *error) {
   size_t cells = tree->session->cells;
@@ -53,7 +49,7 @@ static clt_status find_scale(hierarchy *tree, clt_error *error) {
   double largest = 0;
   for (int c = 0; c < channels; c++) {
     memcpy(sorted, tree->session->flood.data + (size_t)c * cells, cells * sizeof *sorted);
-    qsort(sorted, cells, sizeof *sorted, compare_floats);
+    clt_sort_floats(sorted, cells);
     size_t dark = 0;
     while (dark < cells && sorted[dark] < LIT_SHARE * sorted[cells - 1]) {
       dark++;

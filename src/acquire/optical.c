@@ -15,6 +15,7 @@
 
 #include "acquire/session.h"
 #include "base/memory.h"
+#include "base/order.h"
 
 enum { KEPT = 12, PHOTOGRAPHS_DEFAULT = 40, PHOTOGRAPHS_MAX = 1000, PREPARING = 3, PATIENCE = 2 };
 #define TOLERANCE_DEFAULT 0.005
@@ -138,11 +139,6 @@ static clt_status prepare(optical *own, clt_error *error) {
   return status;
 }
 
-static int compare_floats(const void *left, const void *right) {
-  float a = *(const float *)left, b = *(const float *)right;
-  return (a > b) - (a < b);
-}
-
 /* b = white * picture - b0, white by default the median F of lit cells. */
 static clt_status find_wanted(optical *own, const clt_image *picture, const clt_white *white, double *values,
                               clt_error *error) {
@@ -162,7 +158,7 @@ static clt_status find_wanted(optical *own, const clt_image *picture, const clt_
           "and the exposures",
           c + 1);
     }
-    qsort(sorted, lit, sizeof *sorted, compare_floats);
+    clt_sort_floats(sorted, lit);
     values[c] = white->kind == CLT_WHITE_VALUE ? white->value : (double)sorted[lit / 2];
     for (size_t i = 0; i < own->cells; i++) {
       own->wanted[first + i] = (float)values[c] * picture->data[first + i] - own->session.black.data[first + i];

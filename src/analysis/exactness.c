@@ -2,11 +2,11 @@
  */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "analysis/interreflection.h"
 #include "analysis/lit_inverse.h"
+#include "base/order.h"
 
 static const double SPREAD_LIMIT = 0.01, RECIPROCITY_LIMIT = 0.1;
 
@@ -36,11 +36,6 @@ clt_status clt_exact_first_bounce(const clt_transport *transport, int channel, c
   return status;
 }
 
-static int compare_numbers(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
 /* -median of z_i (R z)_i over the lit cells of a channel, z a checkerboard of +1 and -1, R = T diag(T)^-1 - I. What R
  * carries smoothly cancels against the signs; what stays near its cell is weighed with -1 by the four neighbours. The
  * median leaves out folds, where surfaces meet and cells do light their neighbours. */
@@ -59,7 +54,7 @@ static double channel_spread(clt_interreflection *op, int c) {
       op->seen[count++] = 1 - sign * op->seen[i];
     }
   }
-  qsort(op->seen, count, sizeof *op->seen, compare_numbers);
+  clt_sort_doubles(op->seen, count);
   return count > 0 ? op->seen[count / 2] : 0;
 }
 

@@ -9,6 +9,7 @@
 #include "analysis/interreflection.h"
 #include "analysis/krylov.h"
 #include "base/memory.h"
+#include "base/order.h"
 
 static const double LEAST_ARRIVING = 1e-3; /* of the 90th percentile: less says nothing of the surface */
 static const double NEGATIVE_SHARE = 1e-2; /* of the light: more than noise in T makes */
@@ -21,11 +22,6 @@ struct clt_repainted {
   int channel;
 };
 
-static int compare_numbers(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
 /* The 90th percentile of the lit cells' values of a channel. */
 static double bright(const double *values, const unsigned char *lit, size_t cells, double *scratch) {
   size_t count = 0;
@@ -34,7 +30,7 @@ static double bright(const double *values, const unsigned char *lit, size_t cell
       scratch[count++] = values[i];
     }
   }
-  qsort(scratch, count, sizeof *scratch, compare_numbers);
+  clt_sort_doubles(scratch, count);
   return count > 0 ? scratch[(size_t)(0.9 * (double)(count - 1))] : 0;
 }
 

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 #include "counterlight/analysis.h"
 
 enum { SQUARE_FINE = 2, SQUARE_COARSE = 4, SQUARE_MAX = 16, REPEATS_MAX = 64 };
@@ -271,11 +272,6 @@ static clt_status separate_by(clt_rig *rig, const clt_separation_options *option
   return status;
 }
 
-static int compare_numbers(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
 /* Median of fine / coarse direct light over cells where that stands out of the noise; 1 where none does. */
 static clt_status compare_contrast(const clt_separation *fine, const clt_separation *coarse, double *contrast,
                                    clt_error *error) {
@@ -290,7 +286,7 @@ static clt_status compare_contrast(const clt_separation *fine, const clt_separat
       ratio[count++] = fine->direct.data[i] / direct;
     }
   }
-  qsort(ratio, count, sizeof *ratio, compare_numbers);
+  clt_sort_doubles(ratio, count);
   *contrast = count > 0 ? ratio[count / 2] : 1;
   free(ratio);
   return CLT_OK;

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 #include "cli/calibrate.h"
 #include "counterlight/replay.h"
 
@@ -38,11 +39,6 @@ static clt_status open_devices(cli_calibrate *t, char *source, size_t room, clt_
              : CLT_OK;
 }
 
-static int compare_numbers(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
 /* Of a pixel less the mean of two others, all of deviation s, the deviation is s sqrt(3/2); half of the absolute values
  * of a Gaussian are under 0.6745 of its deviation. */
 static double map_roughness(const clt_pixel_map *map) {
@@ -57,7 +53,7 @@ static double map_roughness(const clt_pixel_map *map) {
     }
   }
   if (count > 0) {
-    qsort(away, count, sizeof *away, compare_numbers);
+    clt_sort_doubles(away, count);
     median = away[count / 2];
   }
   free(away);

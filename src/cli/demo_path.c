@@ -6,6 +6,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "base/order.h"
 #include "cli/demo.h"
 #include "cli/measure.h"
 #include "cli/target.h"
@@ -154,11 +155,6 @@ static clt_status find_limit(demo *d, clt_error *error) {
   return status;
 }
 
-static int ascending(const void *a, const void *b) {
-  float x = *(const float *)a, y = *(const float *)b;
-  return (x > y) - (x < y);
-}
-
 /* The 99.5th percentile of the map before: a few outliers do not darken the rest. */
 static clt_status choose_map_top(demo *d, clt_error *error) {
   size_t cells = clt_image_size(&d->before.error_map);
@@ -167,7 +163,7 @@ static clt_status choose_map_top(demo *d, clt_error *error) {
     return clt_fail(error, CLT_FAILED, "out of memory for %zu cells", cells);
   }
   memcpy(sorted, d->before.error_map.data, cells * sizeof *sorted);
-  qsort(sorted, cells, sizeof *sorted, ascending);
+  clt_sort_floats(sorted, cells);
   double top = sorted[(size_t)(0.995 * (double)(cells - 1))];
   d->map_top = top > 0 ? top : 1;
   free(sorted);

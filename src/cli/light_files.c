@@ -8,6 +8,7 @@
 
 #include "base/file.h"
 #include "base/memory.h"
+#include "base/order.h"
 
 size_t cli_grid_values(const cli_grid *grid) {
   return (size_t)grid->channels * (size_t)grid->height * (size_t)grid->width;
@@ -103,11 +104,6 @@ clt_status cli_light_write(const char *folder, const char *name, const double *v
   return status;
 }
 
-static int compare_numbers(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
 double cli_light_gain(const double *values, const cli_grid *grid, const double *white) {
   size_t count = cli_grid_values(grid), cells = count / (size_t)grid->channels;
   double *sorted = clt_alloc(count, sizeof *sorted), gain = 1;
@@ -115,7 +111,7 @@ double cli_light_gain(const double *values, const cli_grid *grid, const double *
     sorted[i] = values[i] / white[i / cells];
   }
   if (sorted) {
-    qsort(sorted, count, sizeof *sorted, compare_numbers);
+    clt_sort_doubles(sorted, count);
     double bright = sorted[(size_t)(0.99 * (double)(count - 1))];
     gain = bright > 0 ? exp2(fmin(fmax(floor(-log2(bright)), -8), 20)) : 1;
   }

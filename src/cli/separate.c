@@ -1,8 +1,8 @@
 /* counterlight separate: direct and global light of a room, by shifted checkerboards. */
-#include <stdlib.h>
 
 #include "base/clock.h"
 #include "base/file.h"
+#include "base/order.h"
 #include "cli/answer.h"
 #include "cli/command.h"
 #include "cli/folder.h"
@@ -102,11 +102,6 @@ static clt_status measure(task *t, clt_error *error) {
   return status == CLT_CANCELLED ? clt_fail(error, CLT_CANCELLED, "interrupted; nothing was written") : status;
 }
 
-static int compare_numbers(const void *left, const void *right) {
-  float a = *(const float *)left, b = *(const float *)right;
-  return (a > b) - (a < b);
-}
-
 /* The median direct light of each channel, of the cells with any that stands out of the noise. */
 static clt_status find_white(task *t, clt_error *error) {
   clt_image sorted = {0};
@@ -119,7 +114,7 @@ static clt_status find_white(task *t, clt_error *error) {
         sorted.data[count++] = t->light.direct.data[i];
       }
     }
-    qsort(sorted.data, count, sizeof *sorted.data, compare_numbers);
+    clt_sort_floats(sorted.data, count);
     t->white[c] = count > 0 && sorted.data[count / 2] > 0 ? (double)sorted.data[count / 2] : 1;
   }
   clt_image_finish(&sorted);

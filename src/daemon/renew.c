@@ -6,6 +6,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "base/order.h"
 
 static const double DEVIATIONS = 6;
 enum { SHOT_BLACK, SHOT_FLOOD, SHOT_CHECK, SHOT_COUNT = SHOT_CHECK + RENEW_CHECKS };
@@ -129,11 +130,6 @@ static clt_status photograph_all(renewer *self, clt_error *error) {
   return status;
 }
 
-static int compare_numbers(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
 /* flood / T 1 of value i; *deviation is infinite where that says nothing. */
 static double flood_ratio(const renewer *self, size_t i, bool lit, double *deviation) {
   const shot *black = &self->shots[SHOT_BLACK], *flood = &self->shots[SHOT_FLOOD];
@@ -156,7 +152,7 @@ static void find_gains(renewer *self) {
         self->kept[count++] = ratio;
       }
     }
-    qsort(self->kept, count, sizeof(double), compare_numbers);
+    clt_sort_doubles(self->kept, count);
     for (size_t i = 0; i < cells; i++) {
       self->ratio[(size_t)c * cells + i] = count > 0 ? self->kept[count / 2] : 1;
     }

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 #include "sim/gloss.h"
 
 bool clt_camera_sees(const clt_scene_description *description, const clt_visibility *visibility, int surface,
@@ -142,11 +143,6 @@ static void trace_all(clt_cells *cells, const clt_scene_description *description
   cells->partly = partly;
 }
 
-static int compare(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 /* Median of the positive values, which are moved to the front. */
 static double median_positive(double *values, int count) {
   int lit = 0;
@@ -155,7 +151,7 @@ static double median_positive(double *values, int count) {
       values[lit++] = values[k];
     }
   }
-  qsort(values, (size_t)lit, sizeof *values, compare);
+  clt_sort_doubles(values, (size_t)lit);
   return lit > 0 ? values[lit / 2] : 0.0;
 }
 

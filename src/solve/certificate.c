@@ -2,6 +2,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 #include "solve/method.h"
 
 /* A cell is dark below this many standard deviations of its row, or below this share of the bright cells' F. */
@@ -18,11 +19,6 @@ struct clt_certificate {
   clt_model model[CLT_CHANNELS_MAX];
 };
 
-static int compare_numbers(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
 /* The value at a quantile of those values that `chosen` marks (NULL: the positive finite ones), between the two
  * nearest; 0 where there are none. */
 static double quantile(const double *values, const unsigned char *chosen, size_t count, double share, double *scratch) {
@@ -35,7 +31,7 @@ static double quantile(const double *values, const unsigned char *chosen, size_t
   if (kept == 0) {
     return 0;
   }
-  qsort(scratch, kept, sizeof *scratch, compare_numbers);
+  clt_sort_doubles(scratch, kept);
   double position = share * (double)(kept - 1);
   size_t below = (size_t)position, above = below + 1 < kept ? below + 1 : below;
   return scratch[below] + (position - (double)below) * (scratch[above] - scratch[below]);

@@ -6,18 +6,14 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "base/order.h"
 #include "base/random.h"
 
 static const double COMPLETE = 1e-12; /* a Krylov space is, where a step leaves this share of a product */
 enum { PICTURE_SEED = 11 };
 
-static int compare_times(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
 static double median(double *times, int count) {
-  qsort(times, (size_t)count, sizeof *times, compare_times);
+  clt_sort_doubles(times, (size_t)count);
   return times[count / 2];
 }
 

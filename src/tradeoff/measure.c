@@ -8,6 +8,7 @@
 #include "base/clock.h"
 #include "base/file.h"
 #include "base/memory.h"
+#include "base/order.h"
 #include "solve/method.h"
 #include "tradeoff/front.h"
 #include "tradeoff/judge.h"
@@ -129,11 +130,6 @@ static void list_series(work *of) {
   }
 }
 
-static int compare_times(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
 /* Solves again while that takes no more than `allowed_s`, and takes the median time. */
 static clt_status repeat(work *of, clt_solver *solver, double allowed_s, clt_solve_result *result,
                          clt_tradeoff_point *point, clt_error *error) {
@@ -145,7 +141,7 @@ static clt_status repeat(work *of, clt_solver *solver, double allowed_s, clt_sol
     times[point->repeats++] = result->method_seconds;
   } while (status == CLT_OK && point->repeats < REPEATS_MOST &&
            clt_clock_since(start_ns) * (point->repeats + 1) / point->repeats < allowed_s);
-  qsort(times, (size_t)point->repeats, sizeof *times, compare_times);
+  clt_sort_doubles(times, (size_t)point->repeats);
   point->seconds = times[point->repeats / 2];
   return status;
 }

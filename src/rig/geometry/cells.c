@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 #include "rig/footprint.h"
 
 #define APART 4.0 /* times the lower quartile of radii: a footprint from which it is seen at two places */
@@ -70,11 +71,6 @@ static float radius_of(const cells *c, size_t cell) {
   return s > 0 ? (float)sqrt(fmax(squares / s - (x * x + y * y) / (s * s), 0)) : 0;
 }
 
-static int compare_floats(const void *left, const void *right) {
-  float a = *(const float *)left, b = *(const float *)right;
-  return (a > b) - (a < b);
-}
-
 /* radius has room for two values a cell. */
 static void judge(const cells *c, float *radius, uint8_t *fate, clt_footprint_report *report) {
   const clt_footprints *f = c->footprints;
@@ -85,7 +81,7 @@ static void judge(const cells *c, float *radius, uint8_t *fate, clt_footprint_re
       radius[f->cells + count++] = radius[i];
     }
   }
-  qsort(radius + f->cells, count, sizeof *radius, compare_floats);
+  clt_sort_floats(radius + f->cells, count);
   double limit = count > 0 ? fmax(APART * (double)radius[f->cells + count / 4], 2) : INFINITY;
   for (size_t i = 0; i < f->cells; i++) {
     int64_t pixels = f->start[i + 1] - f->start[i];

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 #include "rig/geometry/blur.h"
 #include "rig/geometry/refine.h"
 
@@ -274,11 +275,6 @@ static void decode_tile(const decoder *d, const rectangle *at, const clt_blur *b
   }
 }
 
-static int compare_floats(const void *left, const void *right) {
-  float a = *(const float *)left, b = *(const float *)right;
-  return (a > b) - (a < b);
-}
-
 /* Decodes all tiles and takes the median blur of each axis. */
 static clt_status decode_tiles(const decoder *d, clt_decode_report *report, clt_error *error) {
   int width = d->map->width, height = d->map->height;
@@ -302,7 +298,7 @@ static clt_status decode_tiles(const decoder *d, clt_decode_report *report, clt_
     }
   }
   for (int axis = 0; axis < 2 && used > 0; axis++) {
-    qsort(blurs + axis * tiles, (size_t)used, sizeof *blurs, compare_floats);
+    clt_sort_floats(blurs + axis * tiles, (size_t)used);
     report->blur[axis] = (double)blurs[axis * tiles + used / 2];
   }
   free(blurs);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 
 enum { FEWEST = 50 };
 #define LIT 0.03   /* least light of a probe, of full scale */
@@ -12,18 +13,13 @@ enum { FEWEST = 50 };
 #define MOVED 0.01 /* of the light: what locked cameras and lamps stay below */
 #define SIGMAS 4.0
 
-static int compare_doubles(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
 /* Median, and the standard error of it from the middle half (normal distribution). */
 static double median_of(double *values, int count, double *deviation) {
   if (count < FEWEST) {
     *deviation = 0;
     return NAN;
   }
-  qsort(values, (size_t)count, sizeof *values, compare_doubles);
+  clt_sort_doubles(values, (size_t)count);
   double quartiles = values[count * 3 / 4] - values[count / 4];
   *deviation = 1.2533 * quartiles / 1.349 / sqrt(count);
   return values[count / 2];

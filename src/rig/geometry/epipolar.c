@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 
 enum { FEWEST = 100, FITTED_FROM = 20000 };
 
@@ -106,16 +107,6 @@ static clt_status measure(points *p, const clt_stereo *reference, clt_error *err
   return status;
 }
 
-static int compare_doubles(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
-static int compare_floats(const void *left, const void *right) {
-  float a = *(const float *)left, b = *(const float *)right;
-  return (a > b) - (a < b);
-}
-
 /* Median and 90th percentile of the distances of pixels of at least some confidence; panel is free to hold them. */
 static long summarise(points *p, float least, double *median, double *upper) {
   size_t count = 0;
@@ -124,7 +115,7 @@ static long summarise(points *p, float least, double *median, double *upper) {
       p->panel[count++] = p->distance[i];
     }
   }
-  qsort(p->panel, count, sizeof *p->panel, compare_doubles);
+  clt_sort_doubles(p->panel, count);
   *median = p->panel[count / 2];
   *upper = p->panel[(size_t)(0.9 * (double)(count - 1))];
   return (long)count;
@@ -144,7 +135,7 @@ clt_status clt_epipolar_check(const clt_pixel_map *map, const clt_stereo *refere
     for (size_t i = 0; i < p.count; i++) {
       sorted[i] = p.confidence[i];
     }
-    qsort(sorted, p.count, sizeof *sorted, compare_floats);
+    clt_sort_floats(sorted, p.count);
     out->sure = summarise(&p, sorted[p.count / 2], &out->sure_median, &out->sure_upper);
   }
   finish_points(&p);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 
 #define SATURATED 0.99 /* of full scale */
 
@@ -127,13 +128,8 @@ static int level_of(double sum) {
   return level < LEVELS ? level : LEVELS - 1;
 }
 
-static int compare_doubles(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
 static double median_of(double *values, size_t count) {
-  qsort(values, count, sizeof *values, compare_doubles);
+  clt_sort_doubles(values, count);
   return values[count / 2];
 }
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 #include "rig/photometry/monotone.h"
 
 /* What is left of proportionality, of full scale, below which the camera is called linear. */
@@ -193,11 +194,6 @@ static clt_status refine(const bracket *self, double *h, double *normal, clt_err
   return CLT_OK;
 }
 
-static int compare_doubles(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 /* Departures from e t: the largest, of full scale, without the hundredth of them that is larger still; and relative to
  * the light their deviation, by their median. */
 static double departure(const bracket *self, const double *h, double *relative) {
@@ -217,8 +213,8 @@ static double departure(const bracket *self, const double *h, double *relative) 
     }
   }
   int kept = count - count / 100;
-  qsort(off, (size_t)count, sizeof *off, compare_doubles);
-  qsort(ratio, (size_t)count, sizeof *ratio, compare_doubles);
+  clt_sort_doubles(off, (size_t)count);
+  clt_sort_doubles(ratio, (size_t)count);
   *relative = count > 0 ? 1.4826 * ratio[count / 2] : 0;
   return kept > 0 ? off[kept - 1] : 0;
 }

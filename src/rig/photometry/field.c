@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 
 /* Sample, as a fraction of full scale, from which a pixel counts as saturated. */
 #define SATURATED 0.97
@@ -146,18 +147,13 @@ static void add_difference(void *context, const clt_field_bench *bench, const cl
   }
 }
 
-static int compare_floats(const void *a, const void *b) {
-  float x = *(const float *)a, y = *(const float *)b;
-  return (x > y) - (x < y);
-}
-
 /* Groups by value; sorted is work space. */
 static clt_status sort_into_groups(clt_field_bench *bench, const float *gain, float *sorted, clt_error *error) {
   size_t pixels = bench->pixels, lit = 0;
   for (size_t p = 0; p < pixels; p++) {
     sorted[p] = gain[p];
   }
-  qsort(sorted, pixels, sizeof *sorted, compare_floats);
+  clt_sort_floats(sorted, pixels);
   float bright = sorted[pixels * 9 / 10], noise = fmaxf(-sorted[pixels / 10], 0), least = WELL_LIT * bright;
   /* Of noise alone as much is below nothing as above. */
   if (!(bright > LEAST_GAIN && bright > LEAST_OVER_NOISE * noise)) {

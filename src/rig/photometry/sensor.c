@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 
 /* Share of samples at 0 from which the noise counts as cut off, and at which a field is left out. */
 #define CLIPPED_SHARE 1e-3
@@ -162,11 +163,6 @@ static void fit_line(const point *points, int count, const bool *kept, double *s
   }
 }
 
-static int compare_doubles(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 /* The line through the points, then again without those that are off it by more than 4 of their median departures. */
 static void fit(const transfer *self, clt_sensor_noise *out, double *slope, double *offset) {
   bool kept[POINTS_MAX];
@@ -180,7 +176,7 @@ static void fit(const transfer *self, clt_sensor_noise *out, double *slope, doub
     double line = *slope * self->points[n].light + *offset;
     sorted[n] = off[n] = fabs(self->points[n].variance / line - 1);
   }
-  qsort(sorted, (size_t)count, sizeof *sorted, compare_doubles);
+  clt_sort_doubles(sorted, (size_t)count);
   for (int n = 0; n < count; n++) {
     kept[n] = off[n] <= OUTLIER * 1.4826 * sorted[count / 2];
     out->points += kept[n];

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "base/memory.h"
+#include "base/order.h"
 #include "base/random.h"
 
 enum { FLASHES_MAX = 512, FRAMES_PER_FLASH = 8, FRAMES_MAX = FLASHES_MAX * FRAMES_PER_FLASH, STEPS = 32 };
@@ -290,17 +291,12 @@ static void summarise(const recording *self, const clt_shots *shots, double arou
   out->frames = self->frames;
 }
 
-static int compare_doubles(const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 static double median_frame(const recording *self) {
   double steps[FRAMES_MAX];
   for (int f = 1; f < self->frames; f++) {
     steps[f - 1] = self->frame[f].start_s - self->frame[f - 1].start_s;
   }
-  qsort(steps, (size_t)self->frames - 1, sizeof *steps, compare_doubles);
+  clt_sort_doubles(steps, (size_t)self->frames - 1);
   return steps[(self->frames - 1) / 2];
 }
 

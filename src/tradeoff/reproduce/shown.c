@@ -7,6 +7,7 @@
 
 #include "base/file.h"
 #include "base/memory.h"
+#include "base/order.h"
 
 enum { GAP = 2 };                    /* black cells between two pictures */
 static const double CLIPPED = 0.005; /* of a picture: a highlight is brighter than white */
@@ -44,15 +45,10 @@ void clt_shown_close(clt_shown *shown) {
   *shown = (clt_shown){0};
 }
 
-static int compare_numbers(const void *left, const void *right) {
-  double a = *(const double *)left, b = *(const double *)right;
-  return (a > b) - (a < b);
-}
-
 /* The value that only CLIPPED of the picture exceeds. */
 static double find_white(const double *values, size_t count, double *sorted) {
   memcpy(sorted, values, count * sizeof *sorted);
-  qsort(sorted, count, sizeof *sorted, compare_numbers);
+  clt_sort_doubles(sorted, count);
   return fmax(sorted[(size_t)((1 - CLIPPED) * (double)(count - 1))], 1e-30);
 }
 
