@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "counterlight/panel.h"
 #include "counterlight/status.h"
 
 #ifdef __cplusplus
@@ -54,6 +55,42 @@ struct clt_camera {
   const clt_camera_driver *driver;
 };
 
+/* Which camera, and what to set and lock on it: the section "camera" of a configuration. Drivers take what concerns
+ * them; what is 0 (or negative, where 0 means something) is left as the camera has it, but locked all the same. */
+typedef struct clt_camera_config {
+  char driver[32];
+  char device[CLT_PATH_MAX]; /* "auto", a node, a name below /dev/v4l/by-id, "usb:VENDOR:PRODUCT[:SERIAL]"
+                              * (hexadecimal), "port:BUS-PORT[.PORT...]", a libcamera identifier */
+  char format[8];            /* four characters ("YUYV", "MJPG", "GREY", ...); "auto": the one of the most bits */
+  int width, height;         /* pixels */
+  double rate_hz;            /* frames a second */
+  double gain;               /* of the driver's unit; < 0: as it is */
+  double white_balance_k;    /* kelvin */
+  double focus;              /* of the driver's unit; < 0: as it is */
+  int power_line_hz;         /* 0 off, 50, 60; < 0: as it is */
+} clt_camera_config;
+
+/* Which projector: the section "projector" of a configuration, as for the camera. */
+typedef struct clt_projector_config {
+  char driver[32];
+  char monitor[128]; /* "auto": not the primary one; a name, a part of its model, or "X,Y" of its corner */
+  int width, height; /* of the mode (or the window), pixels; 0: as it is */
+  double refresh_hz; /* 0: as it is */
+  bool window;       /* a window on the desk, not the whole screen */
+} clt_projector_config;
+
+/* A moving picture at the panel's own resolution, corrected on the grid: the drive of panel pixel p and channel c is
+ * gain_c(p) * linear(content_c(p)) + offset_c(p), clipped to 0..1, gain and offset interpolated bilinearly between the
+ * centres of the cells. The panel's responses and crosstalk then give the codes, which are dithered to the glass. */
+typedef struct clt_live_picture {
+  int width, height;      /* of content, pixels: stretched over the whole panel */
+  const uint8_t *content; /* content[(y * width + x) * 3 + c], sRGB codes */
+  int grid_width, grid_height;
+  const float *gain, *offset; /* [(c * grid_height + y) * grid_width + x], three channels */
+  clt_panel panel;
+  uint32_t seed; /* of the dither; another for every frame */
+} clt_live_picture;
+
 /* What a projector is. The panel shows code values; light = response(code). */
 typedef struct clt_projector_info {
   int width, height, channels; /* panel size in pixels; channels 1 or 3 */
@@ -70,6 +107,9 @@ typedef struct clt_projector_driver {
    * (the projector's latency). */
   clt_status (*present)(clt_projector *projector, const float *codes, int64_t *shown_ns, clt_error *error);
   void (*close)(clt_projector *projector); /* frees the projector; accepts NULL */
+  /* The same for a moving picture, which the projector encodes by itself; NULL where it cannot. */
+  clt_status (*present_live)(clt_projector *projector, const clt_live_picture *picture, int64_t *shown_ns,
+                             clt_error *error);
 } clt_projector_driver;
 struct clt_projector {
   const clt_projector_driver *driver;

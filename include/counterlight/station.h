@@ -17,8 +17,8 @@ extern "C" {
 /* The part of a configuration file that names devices and how to measure with them. */
 typedef struct clt_station_config {
   char scene[CLT_PATH_MAX]; /* scene file for simulated devices, resolved against the configuration's folder; or "" */
-  char projector[32];       /* driver names: "simulated" */
-  char camera[32];
+  clt_projector_config projector;
+  clt_camera_config camera;
   char calibration[CLT_PATH_MAX]; /* calibration file, resolved likewise; or "" */
   char replay[CLT_PATH_MAX];      /* recording that stands for both devices, resolved likewise; or "" */
   char record[CLT_PATH_MAX];      /* folder in which every frame is kept; or "". Not of the file */

@@ -9,12 +9,13 @@
 #define TIMEOUT_S 2.0
 enum { ATTEMPTS = 3 };
 
-/* A driver opens its devices for a station; scene is NULL where the configuration names none. A driver of cameras only
- * has no open_projector, and the other way round. */
+/* A driver opens its devices as the configuration says; scene is NULL where it names none. A driver of cameras only has
+ * no open_projector, and the other way round. */
 typedef struct driver_entry {
   const char *name;
-  clt_status (*open_projector)(clt_scene *scene, clt_projector **out, clt_error *error);
-  clt_status (*open_camera)(clt_scene *scene, clt_camera **out, clt_error *error);
+  clt_status (*open_projector)(const clt_projector_config *config, clt_scene *scene, clt_projector **out,
+                               clt_error *error);
+  clt_status (*open_camera)(const clt_camera_config *config, clt_scene *scene, clt_camera **out, clt_error *error);
 } driver_entry;
 
 static clt_status need_scene(const clt_scene *scene, clt_error *error) {
@@ -24,12 +25,16 @@ static clt_status need_scene(const clt_scene *scene, clt_error *error) {
                                   "configuration");
 }
 
-static clt_status open_simulated_projector(clt_scene *scene, clt_projector **out, clt_error *error) {
+static clt_status open_simulated_projector(const clt_projector_config *config, clt_scene *scene, clt_projector **out,
+                                           clt_error *error) {
+  (void)config;
   clt_status status = need_scene(scene, error);
   return status == CLT_OK ? clt_scene_open_projector(scene, out, error) : status;
 }
 
-static clt_status open_simulated_camera(clt_scene *scene, clt_camera **out, clt_error *error) {
+static clt_status open_simulated_camera(const clt_camera_config *config, clt_scene *scene, clt_camera **out,
+                                        clt_error *error) {
+  (void)config;
   clt_status status = need_scene(scene, error);
   return status == CLT_OK ? clt_scene_open_camera(scene, out, error) : status;
 }
@@ -61,14 +66,14 @@ static clt_status find_driver(const char *name, bool camera, const driver_entry 
 
 static clt_status open_drivers(const clt_station_config *config, clt_station *station, clt_error *error) {
   const driver_entry *projector = NULL, *camera = NULL;
-  clt_status status = find_driver(config->projector, false, &projector, error);
+  clt_status status = find_driver(config->projector.driver, false, &projector, error);
   if (status == CLT_OK) {
-    status = find_driver(config->camera, true, &camera, error);
+    status = find_driver(config->camera.driver, true, &camera, error);
   }
   if (status == CLT_OK) {
-    status = projector->open_projector(station->scene, &station->projector, error);
+    status = projector->open_projector(&config->projector, station->scene, &station->projector, error);
   }
-  return status == CLT_OK ? camera->open_camera(station->scene, &station->camera, error) : status;
+  return status == CLT_OK ? camera->open_camera(&config->camera, station->scene, &station->camera, error) : status;
 }
 
 /* Puts the recorder before the devices. */

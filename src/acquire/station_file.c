@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "acquire/station_devices.h"
 #include "base/file.h"
 #include "base/settings.h"
 #include "counterlight/station.h"
@@ -9,27 +10,19 @@
 #include "rig/merge.h"
 
 static const char *const scheme_names[] = {"auto", "brute", "hadamard", "hierarchical", "blocks", NULL};
-#define SIMULATED "simulated"
 #define MS 1e-3
 
 /* What a configuration holds that says nothing: everything from the scene. */
 static void set_defaults(clt_station_config *config) {
-  *config = (clt_station_config){.projector = SIMULATED, .camera = SIMULATED, .rig.latency_s = -1};
+  *config = (clt_station_config){.rig.latency_s = -1};
+  clt_section nothing = {0};
+  clt_station_read_projector(nothing, config);
+  clt_station_read_camera(nothing, config);
   snprintf(config->scheme, sizeof config->scheme, "%s", scheme_names[0]);
 }
 
 static void copy_text(char *to, size_t size, const char *text) {
   snprintf(to, size, "%s", text);
-}
-
-static void read_device(clt_section device, char *driver, size_t size, clt_curve *response, bool *given) {
-  copy_text(driver, size, clt_read_text(device, "driver", SIMULATED, size - 1));
-  const char *text = clt_read_text(device, "response", NULL, 24);
-  clt_error problem = {0};
-  *given = text != NULL;
-  if (text != NULL && clt_curve_parse(text, response, &problem) != CLT_OK) {
-    clt_section_fail(device, "response", "%s", problem.message);
-  }
 }
 
 static void read_patch(clt_section section, clt_patch *patch) {
@@ -106,12 +99,8 @@ clt_status clt_station_read(const char *path, clt_station_config *config, clt_er
   set_defaults(config);
   clt_section root = clt_settings_root(settings);
   status = read_places(root, path, config, error);
-  clt_curve panel = {.kind = CLT_CURVE_LINEAR};
-  read_device(clt_section_group(root, "projector"), config->projector, sizeof config->projector, &panel,
-              &config->projector_response_given);
-  config->rig.projector = clt_panel_of_curve(&panel);
-  read_device(clt_section_group(root, "camera"), config->camera, sizeof config->camera, &config->rig.camera,
-              &config->camera_response_given);
+  clt_station_read_projector(clt_section_group(root, "projector"), config);
+  clt_station_read_camera(clt_section_group(root, "camera"), config);
   config->verify_given = clt_section_has(clt_section_group(root, "rig"), "verify");
   read_rig(clt_section_group(root, "rig"), &config->rig);
   read_acquire(clt_section_group(root, "acquire"), config);

@@ -28,7 +28,7 @@ static clt_status open_devices(cli_calibrate *t, char *source, size_t room, clt_
   if (status) {
     return status;
   }
-  snprintf(source, room, "%s projector, %s camera", t->config.projector, t->config.camera);
+  snprintf(source, room, "%s projector, %s camera", t->config.projector.driver, t->config.camera.driver);
   if (t->station.scene != NULL) {
     clt_rig_config rig;
     clt_scene_rig_config(t->station.scene, &rig);

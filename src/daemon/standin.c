@@ -63,7 +63,8 @@ static void close_standin(clt_projector *projector) {
 
 clt_status standin_create(const daemon_boxes *boxes, const clt_projector_info *info, clt_projector **out,
                           clt_error *error) {
-  static const clt_projector_driver driver = {"stand-in", describe, present, close_standin};
+  static const clt_projector_driver driver = {
+      .name = "stand-in", .describe = describe, .present = present, .close = close_standin};
   standin *made = clt_alloc(1, sizeof *made);
   if (made == NULL) {
     return clt_fail(error, CLT_FAILED, "the stand-in projector: out of memory");

@@ -80,7 +80,8 @@ static void close_projector(clt_projector *projector) {
   }
 }
 
-static const clt_projector_driver driver = {"simulated", describe, present, close_projector};
+static const clt_projector_driver driver = {
+    .name = "simulated", .describe = describe, .present = present, .close = close_projector};
 
 static simulated_projector *create(clt_scene *scene) {
   simulated_projector *self = clt_alloc(1, sizeof *self);

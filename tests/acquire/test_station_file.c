@@ -49,8 +49,8 @@ static void everything_is_read(void **state) {
   assert_int_equal(config.rig.patch.left, 1);
   assert_int_equal(config.rig.patch.top, 2);
   assert_int_equal(config.rig.patch.side, 3);
-  assert_string_equal(config.projector, "simulated");
-  assert_string_equal(config.camera, "other");
+  assert_string_equal(config.projector.driver, "simulated");
+  assert_string_equal(config.camera.driver, "other");
   assert_true(config.projector_response_given && config.camera_response_given);
   assert_int_equal(config.rig.projector.response[0].kind, CLT_CURVE_GAMMA);
   assert_near(config.rig.projector.response[0].gamma, 2.4, 1e-12);
@@ -75,7 +75,7 @@ static void what_is_absent_is_left_to_the_scene(void **state) {
   clt_error error;
   assert_ok(read_text("scene = \"/abs/room.cfg\";", &config, &error), error);
   assert_string_equal(config.scene, "/abs/room.cfg");
-  assert_string_equal(config.projector, "simulated");
+  assert_string_equal(config.projector.driver, "simulated");
   assert_false(config.projector_response_given || config.camera_response_given);
   assert_true(config.rig.latency_s < 0 && !config.verify_given);
   assert_int_equal(strlen(config.calibration) + strlen(config.replay) + strlen(config.record), 0);

@@ -90,7 +90,8 @@ static void close_camera(clt_camera *camera) {
 }
 
 static void source_init(source *s, uint64_t seed) {
-  static const clt_projector_driver projector_driver = {"source", describe_projector, present, close_projector};
+  static const clt_projector_driver projector_driver = {
+      .name = "source", .describe = describe_projector, .present = present, .close = close_projector};
   static const clt_camera_driver camera_driver = {"source", describe_camera, set_exposure, next, close_camera};
   *s = (source){.projector = {&projector_driver}, .camera = {&camera_driver}, .random = seed};
 }

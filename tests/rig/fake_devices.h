@@ -127,7 +127,8 @@ static inline clt_status fake_next(clt_camera *camera, int64_t not_before_ns, do
 
 /* A world of width x height panel pixels that is its own grid, 12 bits, linear, ready for clt_rig_open. */
 static inline void fake_world_init(fake_world *world, int width, int height) {
-  static const clt_projector_driver projector_driver = {"fake", fake_describe_projector, fake_present, NULL};
+  static const clt_projector_driver projector_driver = {
+      .name = "fake", .describe = fake_describe_projector, .present = fake_present};
   static const clt_camera_driver camera_driver = {"fake", fake_describe_camera, fake_set_exposure, fake_next, NULL};
   *world = (fake_world){.panel = {width, height, FAKE_CHANNELS, 8, 1 / 60.0},
                         .sensor = {.width = width * FAKE_K,

@@ -59,7 +59,8 @@ static clt_status next(clt_camera *camera, int64_t not_before_ns, double timeout
 }
 
 static void world_init(world *w) {
-  static const clt_projector_driver projector_driver = {"seen", describe_projector, present, NULL};
+  static const clt_projector_driver projector_driver = {
+      .name = "seen", .describe = describe_projector, .present = present};
   static const clt_camera_driver camera_driver = {"seen", describe_camera, set_exposure, next, NULL};
   clt_error error = {0};
   *w = (world){.projector = {&projector_driver}, .camera = {&camera_driver}, .scene = seen_wall(50)};

@@ -137,7 +137,7 @@ static clt_status boost_present(clt_projector *projector, const float *codes, in
 
 static void a_white_boost_is_named(void **state) {
   (void)state;
-  static const clt_projector_driver driver = {"boosting", boost_describe, boost_present, NULL};
+  static const clt_projector_driver driver = {.name = "boosting", .describe = boost_describe, .present = boost_present};
   rough_room room;
   rough_open(&room, 1, (rough_settings){"response = \"linear\"; bits = 12;", "", ""});
   boosting_projector projector = {{&driver}, room.projector};

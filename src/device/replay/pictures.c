@@ -151,7 +151,8 @@ static void close_camera(clt_camera *camera) {
   }
 }
 
-static const clt_projector_driver projector_driver = {"pictures", describe_projector, present, close_projector};
+static const clt_projector_driver projector_driver = {
+    .name = "pictures", .describe = describe_projector, .present = present, .close = close_projector};
 static const clt_camera_driver camera_driver = {"pictures", describe_camera, set_exposure, next, close_camera};
 
 /* Finds the names, and by the first picture what the camera is. */

@@ -124,7 +124,8 @@ static void close_camera(clt_camera *camera) {
   }
 }
 
-static const clt_projector_driver projector_driver = {"recorded", describe_projector, present, close_projector};
+static const clt_projector_driver projector_driver = {
+    .name = "recorded", .describe = describe_projector, .present = present, .close = close_projector};
 static const clt_camera_driver camera_driver = {"recorded", describe_camera, set_exposure, next, close_camera};
 
 static clt_status make_folder(const char *folder, clt_error *error) {

@@ -170,7 +170,8 @@ static void close_camera(clt_camera *camera) {
   }
 }
 
-static const clt_projector_driver projector_driver = {"replayed", describe_projector, present, close_projector};
+static const clt_projector_driver projector_driver = {
+    .name = "replayed", .describe = describe_projector, .present = present, .close = close_projector};
 static const clt_camera_driver camera_driver = {"replayed", describe_camera, set_exposure, next, close_camera};
 
 bool clt_replay_is_recording(const char *folder) {
