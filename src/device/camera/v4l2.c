@@ -12,7 +12,7 @@
 
 /* After the exposure control was set, frames that begin within so many frames' time may still have the time before:
  * sensors latch a new one for the next frame but one, and it has to get there. */
-#define SETTLE_FRAMES 3
+#define SETTLE_FRAMES 2
 /* Not known of a real camera; a calibration measures them. The read noise, in code values, is too little for two equal
  * pictures to be taken for a fault. */
 #define FULL_WELL 1e4
