@@ -36,6 +36,7 @@ typedef struct clt_run {
   int iterations;              /* done so far */
   size_t curve_count;          /* of the method that runs now */
   double curve[CLT_CURVE_MAX]; /* ||b - S l|| after each iteration */
+  double norm;                 /* the latest of it */
   char note[CLT_NOTE_MAX];     /* why the method broke */
 } clt_run;
 
