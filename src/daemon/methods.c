@@ -5,8 +5,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/log.h"
 #include "daemon/control.h"
+#include "daemon/journal.h"
 
 typedef struct method {
   const char *name;
@@ -220,6 +220,18 @@ static const char *unknown_param(const method *asked, json_t *params) {
   return NULL;
 }
 
+/* Logs who asked for what. */
+static void note_request(const client *from, const char *name) {
+  char line[CLT_MESSAGE_MAX], pid[16], uid[16];
+  snprintf(line, sizeof line, "control socket: pid %ld uid %ld gid %ld asks to %s", (long)from->who.pid,
+           (long)from->who.uid, (long)from->who.gid, name);
+  snprintf(pid, sizeof pid, "%ld", (long)from->who.pid);
+  snprintf(uid, sizeof uid, "%ld", (long)from->who.uid);
+  const journal_field fields[] = {
+      {"COUNTERLIGHT_METHOD", name}, {"COUNTERLIGHT_CLIENT_PID", pid}, {"COUNTERLIGHT_CLIENT_UID", uid}};
+  journal_note(CLT_LOG_INFO, line, fields, sizeof fields / sizeof fields[0]);
+}
+
 void control_on_request(void *context, client *from, const rpc_request *request) {
   size_t i = 0;
   while (i < METHOD_COUNT && strcmp(methods[i].name, request->method) != 0) {
@@ -237,8 +249,7 @@ void control_on_request(void *context, client *from, const rpc_request *request)
     return;
   }
   if (methods[i].changes) {
-    clt_log(CLT_LOG_INFO, "control socket: pid %ld uid %ld gid %ld asks to %s", (long)from->who.pid,
-            (long)from->who.uid, (long)from->who.gid, request->method);
+    note_request(from, request->method);
   }
   methods[i].answer(context, from, request);
 }
