@@ -20,11 +20,7 @@ static void order(control *self, output_order_kind kind) {
 }
 
 static void open_devices(control *self) {
-  if (self->found.gone && self->work.measuring) {
-    self->wishes.open = true; /* the station is not closed under a thread that uses it */
-    return;
-  }
-  order(self, self->found.gone ? OUTPUT_REOPEN : OUTPUT_OPEN);
+  order(self, OUTPUT_OPEN);
 }
 
 /* A picture for the content as it is, unless there is one already; without a projector its size is not known. */
@@ -110,10 +106,14 @@ static void freeze(control *self) {
   sd_event_source_set_enabled(self->retry, SD_EVENT_OFF);
 }
 
+/* A picture for the content is put up meanwhile, and a stored transport serves without a camera too. */
 static void back_off(control *self) {
   double wait_s = machine_back_off(self->attempt, self->config.retry_least_s, self->config.retry_most_s);
   cancel(self);
   prepare(self);
+  if (self->found.open && self->found.model == NULL && self->config.reuse) {
+    control_want(self, SOLVER_LOAD);
+  }
   control_arm(self->retry, wait_s);
   clt_log(CLT_LOG_WARNING, "holding the last picture; next try in %g s", wait_s);
   self->attempt++;

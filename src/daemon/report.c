@@ -132,8 +132,8 @@ static json_t *devices_note(const control_findings *found) {
     return json_null();
   }
   const clt_projector_info *panel = &found->devices.projector;
-  return json_pack("{s:s, s:s, s:o, s:[i, i], s:f}", "projector", found->devices.projector_name, "camera",
-                   found->devices.camera_name, "source", text_or_null(found->source), "panel", panel->width,
+  return json_pack("{s:s, s:o, s:o, s:[i, i], s:f}", "projector", found->devices.projector_name, "camera",
+                   text_or_null(found->camera), "source", text_or_null(found->source), "panel", panel->width,
                    panel->height, "refresh_hz", panel->refresh_s > 0 ? 1 / panel->refresh_s : 0.0);
 }
 

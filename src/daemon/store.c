@@ -131,12 +131,12 @@ static void set_aside(const char *path, const char *suffix) {
   }
 }
 
-/* Says why a transport does not serve this rig, or gives false. */
-static bool is_foreign(const clt_transport *transport, int width, int height, int channels, const char *source,
-                       char *why, size_t size) {
+bool store_is_foreign(const clt_transport *transport, int width, int height, int channels, const char *source,
+                      char *why, size_t size) {
   clt_transport_info info = clt_transport_describe(transport);
   const char *origin = clt_transport_origin(transport)->source;
-  if (info.width != width || info.height != height || info.channels != channels || info.rows != info.cols) {
+  bool other = width > 0 && (info.width != width || info.height != height || info.channels != channels);
+  if (other || info.rows != info.cols) {
     snprintf(why, size, "its grid is %d x %d x %d, the rig's is %d x %d x %d", info.width, info.height, info.channels,
              width, height, channels);
     return true;
@@ -166,7 +166,7 @@ clt_transport *store_load_transport(const store *state, int width, int height, i
     set_aside(path, suffix);
     return NULL;
   }
-  if (is_foreign(transport, width, height, channels, source, why, sizeof why)) {
+  if (store_is_foreign(transport, width, height, channels, source, why, sizeof why)) {
     clt_log(CLT_LOG_WARNING, "the stored transport %s is of another rig and not used: %s", path, why);
     clt_transport_destroy(transport);
     set_aside(path, "old");
