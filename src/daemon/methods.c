@@ -105,12 +105,33 @@ static void wish_content(control *self, client *from, const rpc_request *request
   control_want(self, SOLVER_CONTENT);
 }
 
+/* A name goes into the log and into what systemd is told, line by line. */
+static bool is_one_line(const char *name) {
+  const unsigned char *at = (const unsigned char *)name;
+  while (*at >= ' ' && *at != 0x7f) {
+    at++;
+  }
+  return *at == '\0';
+}
+
+/* What is wrong with the params of `show`, or NULL. */
+static const char *fault_of_show(const char *path, int descriptor) {
+  if (path == NULL && descriptor < 0) {
+    return "needs {\"path\": \"/picture.png\"}, or the opened file passed along (SCM_RIGHTS)";
+  }
+  return path == NULL || is_one_line(path) ? NULL : "\"path\" must have no control characters";
+}
+
 static void answer_show(control *self, client *from, const rpc_request *request) {
-  char message[CLT_MESSAGE_MAX] = "needs {\"path\": \"/picture.png\"}, or the opened file passed along (SCM_RIGHTS)";
+  char message[CLT_MESSAGE_MAX];
   const char *path = json_string_value(json_object_get(request->params, "path"));
   int descriptor = client_take_passed(from);
-  if (descriptor < 0 && path == NULL) {
-    server_refuse(from, request, RPC_INVALID_PARAMS, message);
+  const char *fault = fault_of_show(path, descriptor);
+  if (fault != NULL) {
+    server_refuse(from, request, RPC_INVALID_PARAMS, fault);
+    if (descriptor >= 0) {
+      close(descriptor);
+    }
     return;
   }
   if (descriptor < 0) {
