@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "counterlight/replay.h"
+#include "device/camera/v4l2.h"
 
 /* Where neither the file nor a scene says. */
 #define TIMEOUT_S 2.0
@@ -39,7 +40,20 @@ static clt_status open_simulated_camera(const clt_camera_config *config, clt_sce
   return status == CLT_OK ? clt_scene_open_camera(scene, out, error) : status;
 }
 
-static const driver_entry drivers[] = {{"simulated", open_simulated_projector, open_simulated_camera}};
+#ifdef CLT_HAVE_V4L2
+static clt_status open_v4l2_camera(const clt_camera_config *config, clt_scene *scene, clt_camera **out,
+                                   clt_error *error) {
+  (void)scene;
+  return clt_v4l2_open(config, out, error);
+}
+#endif
+
+static const driver_entry drivers[] = {
+    {"simulated", open_simulated_projector, open_simulated_camera},
+#ifdef CLT_HAVE_V4L2
+    {"v4l2", NULL, open_v4l2_camera},
+#endif
+};
 enum { DRIVERS = sizeof drivers / sizeof drivers[0] };
 
 static bool drives(const driver_entry *driver, bool camera) {

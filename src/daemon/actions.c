@@ -8,11 +8,13 @@
 /* Longest time from the wish to stop to the end, s; a solve that cannot be interrupted is left behind then. */
 static const double grace_s = 1.0;
 
-static void order(const control *self, output_order_kind kind) {
+/* The output does not turn while it obeys. */
+static void order(control *self, output_order_kind kind) {
   output_order *letter = clt_alloc(1, sizeof *letter);
   if (letter != NULL) {
     letter->kind = kind;
     letter->station = self->config.station;
+    notify_patience(&self->notify, true);
     clt_mailbox_put(self->boxes->orders, letter);
   }
 }

@@ -8,6 +8,7 @@
 #include <systemd/sd-event.h>
 #include <time.h>
 
+#include "base/log.h"
 #include "daemon/config.h"
 #include "daemon/letters.h"
 #include "daemon/listen.h"
@@ -76,7 +77,7 @@ typedef struct control {
   daemon_overrides overrides;
   daemon_config config;
   sd_event *loop;
-  sd_event_source *wake, *signals[3], *retry, *verify, *watchdog, *grace;
+  sd_event_source *wake, *signals[3], *retry, *verify, *grace;
   server *service;
   notifier notify;
   machine_state state;
@@ -143,5 +144,7 @@ json_t *control_snapshot_note(const control *self);
 json_t *control_progress_note(const measure_progress *progress);
 /* One line for systemd's STATUS= and the log. */
 void control_status_line(const control *self, char *line, size_t size);
+/* Logs a line; the journal gets state, reason, content and devices as fields of their own. */
+void control_note(const control *self, clt_log_level level, const char *line);
 
 #endif

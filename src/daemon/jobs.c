@@ -137,6 +137,7 @@ void control_want(control *self, solver_kind kind) {
 }
 
 void control_on_opened(control *self, output_opened *letter) {
+  notify_patience(&self->notify, self->state == STATE_STOPPING);
   if (letter->error.status == CLT_OK) {
     self->found.devices = *letter;
     self->found.open = true;

@@ -3,6 +3,7 @@
 
 #include "base/file.h"
 #include "daemon/control.h"
+#include "daemon/journal.h"
 
 /* A time as 2026-01-31T12:00:00Z. */
 static json_t *iso_time(time_t when) {
@@ -177,4 +178,16 @@ void control_status_line(const control *self, char *line, size_t size) {
   } else {
     snprintf(line, size, "%s", name);
   }
+}
+
+void control_note(const control *self, clt_log_level level, const char *line) {
+  const control_findings *found = &self->found;
+  const journal_field fields[] = {
+      {"COUNTERLIGHT_STATE", machine_state_name(self->state)},
+      {"COUNTERLIGHT_WHY", self->why},
+      {"COUNTERLIGHT_CONTENT", found->content},
+      {"COUNTERLIGHT_PROJECTOR", found->open ? found->devices.projector_name : ""},
+      {"COUNTERLIGHT_CAMERA", found->open ? found->devices.camera_name : ""},
+  };
+  journal_note(level, line, fields, sizeof fields / sizeof fields[0]);
 }

@@ -36,13 +36,17 @@ static void sweep(const store *state) {
   }
 }
 
-static clt_status take_lock(store *out, clt_error *error) {
+/* The problem: why there is no lock, which is no failure. */
+static clt_status take_lock(store *out, clt_error *problem, clt_error *error) {
   char path[CLT_PATH_MAX];
   clt_status status = store_path(out, ".lock", path, error);
   if (status != CLT_OK) {
     return status;
   }
   out->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0640);
+  if (out->lock < 0) {
+    clt_fail(problem, CLT_FAILED, "%s: %s", path, strerror(errno));
+  }
   if (out->lock >= 0 && flock(out->lock, LOCK_EX | LOCK_NB) != 0) {
     store_close(out);
     return clt_fail(error, CLT_FAILED,
@@ -60,7 +64,7 @@ clt_status store_open(const char *folder, store *out, clt_error *error) {
   clt_error problem = {0};
   clt_status status = CLT_OK;
   if (clt_place_make_folder(folder, 0750, &problem) == CLT_OK) {
-    status = take_lock(out, error);
+    status = take_lock(out, &problem, error);
   }
   if (status == CLT_OK && !out->writable) {
     clt_log(CLT_LOG_WARNING, "%s: the state directory cannot be written to: nothing will survive a restart%s%s", folder,
