@@ -187,7 +187,7 @@ void control_note(const control *self, clt_log_level level, const char *line) {
       {"COUNTERLIGHT_WHY", self->why},
       {"COUNTERLIGHT_CONTENT", found->content},
       {"COUNTERLIGHT_PROJECTOR", found->open ? found->devices.projector_name : ""},
-      {"COUNTERLIGHT_CAMERA", found->open ? found->devices.camera_name : ""},
+      {"COUNTERLIGHT_CAMERA", found->camera},
   };
   journal_note(level, line, fields, sizeof fields / sizeof fields[0]);
 }
