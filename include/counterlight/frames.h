@@ -19,8 +19,10 @@ typedef struct clt_frames clt_frames;
 
 typedef struct clt_frames_options {
   clt_live_options live;
-  clt_white white; /* FEASIBLE: as AUTO, and target = white (scale picture + offset) with the offset and the scale that
-                      the pictures need to be in reach; else scale 1, offset 0, and what is out of reach is clipped */
+  clt_white white; /* FEASIBLE: as AUTO, with `reach` */
+  bool reach; /* target = white (scale picture + offset) with the least offset and the largest scale, at most 1, that
+                 bring every lit cell of the pictures in reach of a drive in 0..1; else scale 1, offset 0, and what
+                 is out of reach is clipped */
   double smooth_s; /* time constant with which scale and offset follow, s, > 0; 0 means 0.5 */
 } clt_frames_options;
 
@@ -52,9 +54,8 @@ CLT_PUBLIC void clt_frames_destroy(clt_frames *frames); /* accepts NULL */
  *   offset = x - gain mean(p)           so that the cell as a whole has the drive x
  * in three channels each (a transport of one channel: three times the same, for the content's luminance), as
  * clt_live_picture takes them; both are 0 at dark cells. One call at a time. */
-CLT_PUBLIC clt_status clt_frames_next(clt_frames *frames, const uint8_t *content, int width, int height,
-                                      double seconds, float *gain, float *offset, clt_frames_result *result,
-                                      clt_error *error);
+CLT_PUBLIC clt_status clt_frames_next(clt_frames *frames, const uint8_t *content, int width, int height, double seconds,
+                                      float *gain, float *offset, clt_frames_result *result, clt_error *error);
 /* The drive of the cells of the last frame: channels * cells values, owned by frames. */
 CLT_PUBLIC const float *clt_frames_drive(const clt_frames *frames);
 /* Another budget for the solve from the next frame on, ms; 0: no limit. */

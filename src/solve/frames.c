@@ -50,7 +50,7 @@ static clt_status prepare(clt_frames *self, const clt_frames_options *options, c
   self->target = self->before + values;
   self->drive = self->target + values;
   clt_status status = find_white(self, &options->white, error);
-  if (status == CLT_OK && options->white.kind == CLT_WHITE_FEASIBLE) {
+  if (status == CLT_OK && (options->reach || options->white.kind == CLT_WHITE_FEASIBLE)) {
     double smooth_s = options->smooth_s > 0 ? options->smooth_s : SMOOTH_S;
     status = clt_mapping_create(self->transport, self->certificate, self->white, smooth_s, &self->mapping, error);
   }
