@@ -8,6 +8,7 @@
 #include "counterlight/calibration.h"
 #include "counterlight/device.h"
 #include "counterlight/forward.h"
+#include "counterlight/frames.h"
 #include "counterlight/image.h"
 #include "counterlight/live.h"
 #include "counterlight/loop.h"

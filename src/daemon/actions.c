@@ -90,6 +90,7 @@ static void show(control *self) {
     return;
   }
   letter->panel = self->found.devices.panel;
+  letter->serial = self->found.picture_content;
   clt_mailbox_put(self->boxes->drives, letter);
 }
 
@@ -124,6 +125,7 @@ static void stop(control *self) {
   freeze(self);
   control_arm(self->grace, grace_s);
   control_measure(self, MEASURE_STOP);
+  control_stop_moving(self);
   solver_job *job = clt_alloc(1, sizeof *job);
   if (job != NULL) {
     job->kind = SOLVER_STOP;

@@ -160,6 +160,11 @@ static int on_wake(sd_event_source *source, int descriptor, uint32_t events, voi
     control_on_solved(self, solved);
     solver_result_free(solved);
   }
+  moving_report *moved = clt_mailbox_take(boxes->moved, 0);
+  if (moved != NULL) {
+    control_on_moved(self, moved);
+    free(moved);
+  }
   output_frames *frames = clt_mailbox_take(boxes->frames, 0);
   if (frames != NULL) {
     take_frames(self, frames);

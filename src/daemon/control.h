@@ -1,6 +1,7 @@
 /* The control loop: owns the state machine and decides what the other threads do. One struct, these files:
  * control.c (events of the loop), actions.c (what the machine's actions do), jobs.c (work given to the other threads
- * and its answers), verdicts.c (what photographs say), methods.c (what clients may ask), report.c (what they are told).
+ * and its answers), plays.c (content that moves), verdicts.c (what photographs say), methods.c (what clients may ask),
+ * report.c (what they are told).
  */
 #ifndef CLT_DAEMON_CONTROL_H
 #define CLT_DAEMON_CONTROL_H
@@ -41,6 +42,7 @@ typedef struct control_work {
   solver_kind solver_kind; /* of the job that is being solved */
   bool rigless;            /* it looks for a transport before the rig is known */
   uint64_t content_ticket, snapshot_ticket;
+  moving_job playing; /* the last one given to moving; its model is for comparison only */
 } control_work;
 
 /* What they found. */
@@ -68,6 +70,7 @@ typedef struct control_findings {
   clt_fit fit;
   refinement refined; /* of the picture that is up; photographs 0: as it was solved for */
   output_frames frames;
+  moving_report moved; /* serial 0: nothing moves yet */
   measure_progress progress;
 } control_findings;
 
@@ -122,6 +125,11 @@ void control_on_measured(control *self, measure_result *letter);
 void control_on_solved(control *self, solver_result *letter);
 void control_finish_jobs(control *self);
 
+/* plays.c: has the content move, where it does and that is not so yet; ends that with the daemon. */
+void control_play(control *self);
+void control_stop_moving(control *self);
+void control_on_moved(control *self, const moving_report *letter);
+
 /* verdicts.c */
 void control_on_verification(control *self, measure_result *letter);
 void control_on_refinement(control *self, measure_result *letter);
@@ -141,6 +149,8 @@ json_t *control_drift_note(const control *self);
 json_t *control_renewed_note(const control *self);
 /* Paths of the last snapshot. */
 json_t *control_snapshot_note(const control *self);
+/* How the film plays; null where nothing moves. */
+json_t *control_moving_note(const control *self);
 json_t *control_progress_note(const measure_progress *progress);
 /* One line for systemd's STATUS= and the log. */
 void control_status_line(const control *self, char *line, size_t size);

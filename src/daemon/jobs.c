@@ -141,6 +141,7 @@ void control_on_opened(control *self, output_opened *letter) {
   if (letter->error.status == CLT_OK) {
     self->found.devices = *letter;
     self->found.open = true;
+    control_play(self);
     control_event(self, EVENT_OPENED);
     return;
   }
@@ -323,6 +324,7 @@ void control_on_solved(control *self, solver_result *letter) {
   default:
     break;
   }
+  control_play(self);
   pump(self);
 }
 

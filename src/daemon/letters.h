@@ -2,11 +2,13 @@
  *
  *   main      (output.c)   begins and ends the station, owns the projector (opens it, closes it where it is lost),
  *                          presents; never waits for another thread for longer than one refresh
- *   measure   (measure.c)  owns the station's camera and rig (opens them, closes them where the camera is lost); its
- * rig projects through a stand-in (standin.c) that hands each pattern to main solver    (solver.c)   owns the content,
- * the transport with its certificate, and the files of the state directory control   (control.c)  owns the state
- * machine, the control socket, signals, timers and the watchdog; decides what the others do and keeps copies of what
- * they found
+ *   measure   (measure.c)  owns the station's camera and rig (opens them, closes them where the camera is lost); the
+ *                          rig projects through a stand-in (standin.c) that hands each pattern to main
+ *   solver    (solver.c)   owns the content, the transport with its certificate, and the files of the state directory
+ *   moving    (moving.c)   owns the film that plays (player.c, with a thread that decodes) and makes a moving picture
+ *                          of each frame
+ *   control   (control.c)  owns the state machine, the control socket, signals, timers and the watchdog; decides what
+ *                          the others do and keeps copies of what they found
  *
  * A letter belongs to the sender until it is put, to the mailbox until it is taken, then to the receiver. Mailboxes
  * keep the latest letter only, so:
@@ -28,6 +30,8 @@
 typedef struct daemon_boxes {
   clt_mailbox *orders;       /* control -> main: output_order */
   clt_mailbox *drives;       /* control -> main: output_drive */
+  clt_mailbox *moving;       /* moving -> main: output_moving */
+  clt_mailbox *spares;       /* main -> moving: output_moving, to be filled again */
   clt_mailbox *patterns;     /* measure -> main: output_pattern */
   clt_mailbox *answers;      /* main -> measure: output_answer */
   clt_mailbox *opened;       /* main -> control: output_opened */
@@ -36,6 +40,8 @@ typedef struct daemon_boxes {
   clt_mailbox *progress;     /* measure -> control: measure_progress */
   clt_mailbox *measured;     /* measure -> control: measure_result */
   clt_mailbox *solver_jobs;  /* control -> solver: solver_job */
+  clt_mailbox *moving_jobs;  /* control -> moving: moving_job */
+  clt_mailbox *moved;        /* moving -> control: moving_report */
   clt_mailbox *haste;        /* control -> solver: solver_haste */
   clt_mailbox *solved;       /* solver -> control: solver_result */
   int wake;                  /* eventfd, non-blocking */
@@ -58,7 +64,17 @@ typedef struct output_order {
 typedef struct output_drive {
   clt_image drive;
   clt_panel panel; /* that it is for */
+  uint64_t serial; /* of its content */
 } output_drive;
+
+/* A moving picture to show from now on, unless a drive for newer content is there. Its arrays are the letter's. */
+typedef struct output_moving {
+  uint64_t serial; /* of its content */
+  clt_live_picture picture;
+  uint8_t *content;
+  float *fields;                    /* gain, then offset */
+  size_t content_room, fields_room; /* bytes */
+} output_moving;
 
 /* A picture of panel codes to show at once and until the next pattern; without codes: measuring has ended, the drive
  * comes back. */
@@ -216,6 +232,29 @@ typedef struct solver_result {
   daemon_model *model;        /* in use, held; NULL: none */
 } solver_result;
 
+/* --- moving --- */
+
+/* What is to move from now on. */
+typedef struct moving_job {
+  bool stop;               /* the daemon ends */
+  uint64_t serial;         /* of the content */
+  char path[CLT_PATH_MAX]; /* of the film; empty: nothing moves */
+  clt_projector_info projector;
+  clt_panel panel;
+  daemon_model *model;       /* held; NULL: shown uncompensated */
+  clt_frames_options frames; /* live.budget_ms: of a frame's solve */
+  double picture_s;          /* that each picture of a folder is shown */
+} moving_job;
+
+typedef struct moving_report {
+  uint64_t serial;                /* of the content */
+  uint64_t frames, late, skipped; /* of the film: shown; ready more than a refresh after they were due; passed over */
+  double fps;                     /* over the last report's time */
+  bool compensated;
+  double ms;              /* that the last frame took */
+  clt_frames_result last; /* of that, where it is compensated */
+} moving_report;
+
 /* Deep copy; `to` is overwritten. CLT_FAILED where memory is short (then `to` is empty). */
 clt_status daemon_picture_copy(const daemon_picture *from, daemon_picture *to, clt_error *error);
 void daemon_picture_finish(daemon_picture *picture); /* accepts an empty one */
@@ -224,6 +263,8 @@ clt_status daemon_image_copy(const clt_image *from, clt_image *to, clt_error *er
 /* Frees of letters that hold more than themselves; each accepts NULL. */
 void output_drive_free(void *letter);
 void output_pattern_free(void *letter);
+void output_moving_free(void *letter);
+void moving_job_free(void *letter);
 void measure_job_free(void *letter);
 void measure_result_free(void *letter);
 void solver_job_free(void *letter);

@@ -16,10 +16,12 @@ struct output {
   bool begun;          /* the station is */
   bool open, stopping; /* the projector is open */
   clt_projector_info panel;
-  clt_panel known;     /* the panel's light, as far as it is known before the rig is */
-  output_drive *drive; /* the latest; survives a reopening */
-  float *codes;        /* of the drive on this panel */
-  bool measuring;      /* a pattern is on the glass and stays there */
+  clt_panel known;       /* the panel's light, as far as it is known before the rig is */
+  output_drive *drive;   /* the latest; survives a reopening */
+  float *codes;          /* of the drive on this panel */
+  output_moving *moving; /* the latest; NULL: nothing moves */
+  float *moving_codes;   /* of it on this panel, where the projector does not encode by itself */
+  bool measuring;        /* a pattern is on the glass and stays there */
   output_frames frames;
   int64_t reported_ns;
   output_frames reported;
@@ -40,7 +42,9 @@ void output_destroy(output *main) {
   if (main != NULL) {
     clt_station_close(&main->station);
     output_drive_free(main->drive);
+    output_moving_free(main->moving);
     free(main->codes);
+    free(main->moving_codes);
     free(main);
   }
 }
@@ -85,6 +89,8 @@ static void open_projector(output *main, const clt_station_config *config) {
   main->begun = main->begun || clt_station_begin(config, &main->station, &error) == CLT_OK;
   if (!main->open && main->begun && clt_station_open_projector(config, &main->station, &error) == CLT_OK) {
     main->open = true;
+    free(main->moving_codes);
+    main->moving_codes = NULL;
     main->station.projector->driver->describe(main->station.projector, &main->panel);
     main->known = clt_station_rig_config(config, &main->station).projector;
     encode_drive(main);
@@ -125,6 +131,18 @@ static void take_drive(output *main) {
   }
 }
 
+static void take_moving(output *main) {
+  output_moving *newer = clt_mailbox_take(main->boxes->moving, 0);
+  if (newer != NULL && main->moving != NULL) {
+    clt_mailbox_put(main->boxes->spares, main->moving);
+  }
+  main->moving = newer != NULL ? newer : main->moving;
+}
+
+static bool is_moving(const output *main) {
+  return main->moving != NULL && (main->drive == NULL || main->moving->serial >= main->drive->serial);
+}
+
 static clt_status present(output *main, const float *codes, int64_t *shown_ns, clt_error *error) {
   clt_projector *projector = main->station.projector;
   if (!main->open) {
@@ -156,13 +174,39 @@ static void take_pattern(output *main, output_pattern *pattern) {
   }
 }
 
-static void show_drive(output *main) {
+/* By the projector itself, else encoded and dithered here. Every refresh has a dither of its own. */
+static clt_status present_moving(output *main, int64_t *shown_ns, clt_error *error) {
+  clt_projector *projector = main->station.projector;
+  clt_live_picture *picture = &main->moving->picture;
+  const clt_projector_info *panel = &main->panel;
+  size_t count = (size_t)panel->channels * (size_t)panel->height * (size_t)panel->width;
+  picture->seed = (uint32_t)main->frames.presented;
+  if (projector->driver->present_live != NULL) {
+    clt_status status = projector->driver->present_live(projector, picture, shown_ns, error);
+    main->frames.presented += status == CLT_OK;
+    return status;
+  }
+  main->moving_codes = main->moving_codes != NULL ? main->moving_codes : clt_alloc(count, sizeof(float));
+  if (main->moving_codes == NULL) {
+    return clt_fail(error, CLT_FAILED, "no memory for a picture of %d x %d", panel->width, panel->height);
+  }
+  clt_status status = clt_live_encode(picture, panel->channels, panel->height, panel->width, main->moving_codes, error);
+  if (status != CLT_OK) {
+    return status;
+  }
+  clt_live_dither(main->moving_codes, count, panel->bits, picture->seed);
+  return present(main, main->moving_codes, shown_ns, error);
+}
+
+static void show_picture(output *main) {
   int64_t shown_ns;
   clt_error error = {0};
-  if (main->codes == NULL || main->measuring || !main->open) {
+  bool moves = is_moving(main);
+  if (main->measuring || !main->open || (main->codes == NULL && !moves)) {
     return;
   }
-  if (present(main, main->codes, &shown_ns, &error) == CLT_OK) {
+  clt_status status = moves ? present_moving(main, &shown_ns, &error) : present(main, main->codes, &shown_ns, &error);
+  if (status == CLT_OK) {
     main->frames.picture = true;
   } else {
     lose_projector(main, &error);
@@ -189,7 +233,8 @@ static void turn(output *main) {
   int64_t start_ns = clt_clock_ns();
   obey(main);
   take_drive(main);
-  show_drive(main);
+  take_moving(main);
+  show_picture(main);
   main->frames.turns++;
   report_frames(main);
   double left = refresh_s - clt_clock_since(start_ns);

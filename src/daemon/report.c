@@ -96,6 +96,27 @@ json_t *control_renewed_note(const control *self) {
                    renewed->after.off, "limit", renewed->after.limit, "fits", renewed->after.fits);
 }
 
+json_t *control_moving_note(const control *self) {
+  const moving_report *moved = &self->found.moved;
+  const clt_frames_result *last = &moved->last;
+  if (moved->serial != self->found.content_serial || self->work.playing.path[0] == '\0') {
+    return json_null();
+  }
+  json_t *note = json_pack("{s:I, s:I, s:I, s:f, s:b, s:f}", "frames", (json_int_t)moved->frames, "late",
+                           (json_int_t)moved->late, "skipped", (json_int_t)moved->skipped, "fps", moved->fps,
+                           "compensated", moved->compensated, "ms", moved->ms);
+  if (moved->compensated) {
+    json_object_set_new(note, "error", json_real(last->live.error));
+    json_object_set_new(note, "scale", json_real(last->scale));
+    json_object_set_new(note, "offset", json_real(last->offset));
+    json_object_set_new(note, "stages",
+                        json_pack("{s:f, s:f, s:f, s:f}", "mean_ms", last->ms[CLT_FRAMES_MEAN], "map_ms",
+                                  last->ms[CLT_FRAMES_MAP], "solve_ms", last->ms[CLT_FRAMES_SOLVE], "fields_ms",
+                                  last->ms[CLT_FRAMES_FIELDS]));
+  }
+  return note;
+}
+
 static json_t *frame_note(const control_findings *found) {
   const clt_compensation *made = &found->picture.compensation;
   bool compensated = found->picture.compensated;
@@ -144,7 +165,9 @@ json_t *control_status(const control *self) {
   json_object_set_new(status, "version", json_string(CLT_VERSION));
   json_object_set_new(status, "content", text_or_null(self->found.content));
   json_object_set_new(status, "transport", transport_note(&self->found.transport));
-  json_object_set_new(status, "frame", frame_note(&self->found));
+  json_t *frame = frame_note(&self->found);
+  json_object_set_new(frame, "moving", control_moving_note(self));
+  json_object_set_new(status, "frame", frame);
   json_object_set_new(status, "verify", control_verify_note(self));
   json_object_set_new(status, "reacquired", control_renewed_note(self));
   json_object_set_new(status, "drift", control_drift_note(self));

@@ -3,7 +3,6 @@
 #define CLT_IMAGE_CELL_MEANS_H
 
 #include <stddef.h>
-
 #include <stdint.h>
 
 #include "counterlight/status.h"
