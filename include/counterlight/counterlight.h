@@ -9,6 +9,7 @@
 #include "counterlight/device.h"
 #include "counterlight/forward.h"
 #include "counterlight/image.h"
+#include "counterlight/live.h"
 #include "counterlight/loop.h"
 #include "counterlight/panel.h"
 #include "counterlight/replay.h"

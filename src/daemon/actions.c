@@ -8,21 +8,19 @@
 /* Longest time from the wish to stop to the end, s; a solve that cannot be interrupted is left behind then. */
 static const double grace_s = 1.0;
 
-static void order(const control *self, output_order_kind kind) {
+/* The output does not turn while it obeys. */
+static void order(control *self, output_order_kind kind) {
   output_order *letter = clt_alloc(1, sizeof *letter);
   if (letter != NULL) {
     letter->kind = kind;
     letter->station = self->config.station;
+    notify_patience(&self->notify, true);
     clt_mailbox_put(self->boxes->orders, letter);
   }
 }
 
 static void open_devices(control *self) {
-  if (self->found.gone && self->work.measuring) {
-    self->wishes.open = true; /* the station is not closed under a thread that uses it */
-    return;
-  }
-  order(self, self->found.gone ? OUTPUT_REOPEN : OUTPUT_OPEN);
+  order(self, OUTPUT_OPEN);
 }
 
 /* A picture for the content as it is, unless there is one already; without a projector its size is not known. */
@@ -108,10 +106,14 @@ static void freeze(control *self) {
   sd_event_source_set_enabled(self->retry, SD_EVENT_OFF);
 }
 
+/* A picture for the content is put up meanwhile, and a stored transport serves without a camera too. */
 static void back_off(control *self) {
   double wait_s = machine_back_off(self->attempt, self->config.retry_least_s, self->config.retry_most_s);
   cancel(self);
   prepare(self);
+  if (self->found.open && self->found.model == NULL && self->config.reuse) {
+    control_want(self, SOLVER_LOAD);
+  }
   control_arm(self->retry, wait_s);
   clt_log(CLT_LOG_WARNING, "holding the last picture; next try in %g s", wait_s);
   self->attempt++;

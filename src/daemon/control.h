@@ -8,6 +8,7 @@
 #include <systemd/sd-event.h>
 #include <time.h>
 
+#include "base/log.h"
 #include "daemon/config.h"
 #include "daemon/letters.h"
 #include "daemon/listen.h"
@@ -24,7 +25,6 @@ typedef struct control_wishes {
   unsigned solver;        /* bit set of solver_kind */
   bool acquire;           /* a new transport is owed, through failures and retries, until it serves */
   measure_kind scope;     /* of that: MEASURE_PHOTOMETRY, MEASURE_CHANGED, else all of it */
-  bool open;              /* devices to be opened again once `measure` is idle */
   bool refine;            /* asked for, at the next verification */
   bool snapshot;          /* to be written when the picture has been photographed */
   int content_descriptor; /* of SOLVER_CONTENT; -1: the configured picture */
@@ -39,15 +39,16 @@ typedef struct control_work {
   uint64_t measure_number; /* newest job of measure */
   bool measuring, solving; /* its answer is not here yet */
   solver_kind solver_kind; /* of the job that is being solved */
+  bool rigless;            /* it looks for a transport before the rig is known */
   uint64_t content_ticket, snapshot_ticket;
 } control_work;
 
 /* What they found. */
 typedef struct control_findings {
-  bool open; /* the devices are */
-  bool gone; /* and must be closed before they are opened again */
+  bool open; /* the projector is */
   output_opened devices;
-  bool calibrated;
+  char camera[32];             /* its driver; empty while it is not open */
+  bool calibrated;             /* what follows is known */
   int width, height, channels; /* of the grid */
   char response[32], source[CLT_TEXT_MAX];
   transport_facts transport;
@@ -76,7 +77,7 @@ typedef struct control {
   daemon_overrides overrides;
   daemon_config config;
   sd_event *loop;
-  sd_event_source *wake, *signals[3], *retry, *verify, *watchdog, *grace;
+  sd_event_source *wake, *signals[3], *retry, *verify, *grace;
   server *service;
   notifier notify;
   machine_state state;
@@ -143,5 +144,7 @@ json_t *control_snapshot_note(const control *self);
 json_t *control_progress_note(const measure_progress *progress);
 /* One line for systemd's STATUS= and the log. */
 void control_status_line(const control *self, char *line, size_t size);
+/* Logs a line; the journal gets state, reason, content and devices as fields of their own. */
+void control_note(const control *self, clt_log_level level, const char *line);
 
 #endif

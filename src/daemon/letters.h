@@ -1,12 +1,12 @@
 /* The daemon's threads, who owns what, and the letters between them.
  *
- *   main      (output.c)   opens and closes the station, owns the projector, presents; never waits for another thread
- *                          for longer than one refresh
- *   measure   (measure.c)  owns the station's camera and rig while it works on a job; its rig projects through a
- *                          stand-in (standin.c) that hands each pattern to main
- *   solver    (solver.c)   owns the content, the transport with its certificate, and the files of the state directory
- *   control   (control.c)  owns the state machine, the control socket, signals, timers and the watchdog; decides what
- *                          the others do and keeps copies of what they found
+ *   main      (output.c)   begins and ends the station, owns the projector (opens it, closes it where it is lost),
+ *                          presents; never waits for another thread for longer than one refresh
+ *   measure   (measure.c)  owns the station's camera and rig (opens them, closes them where the camera is lost); its
+ * rig projects through a stand-in (standin.c) that hands each pattern to main solver    (solver.c)   owns the content,
+ * the transport with its certificate, and the files of the state directory control   (control.c)  owns the state
+ * machine, the control socket, signals, timers and the watchdog; decides what the others do and keeps copies of what
+ * they found
  *
  * A letter belongs to the sender until it is put, to the mailbox until it is taken, then to the receiver. Mailboxes
  * keep the latest letter only, so:
@@ -48,9 +48,9 @@ void daemon_report(const daemon_boxes *boxes, clt_mailbox *box, void *letter);
 
 /* --- main --- */
 
-typedef enum output_order_kind { OUTPUT_OPEN, OUTPUT_REOPEN, OUTPUT_STOP } output_order_kind;
+typedef enum output_order_kind { OUTPUT_OPEN, OUTPUT_STOP } output_order_kind;
 typedef struct output_order {
-  output_order_kind kind; /* OPEN: where it is not open yet; REOPEN: close first (only while measure has no job) */
+  output_order_kind kind; /* OPEN: the projector, where it is not open yet */
   clt_station_config station;
 } output_order;
 
@@ -70,12 +70,12 @@ typedef struct output_answer {
   clt_error error; /* status CLT_OK: it is on the glass */
 } output_answer;
 
-/* What became of opening the devices, or (CLT_GONE) that the projector is no longer there. */
+/* What became of opening the projector, or (CLT_GONE) that it is no longer there and was closed. */
 typedef struct output_opened {
-  clt_error error; /* CLT_OK: open */
-  clt_station *station;
+  clt_error error;      /* CLT_OK: open */
+  clt_station *station; /* begun; its camera and rig are for measure */
   clt_projector_info projector;
-  char projector_name[32], camera_name[32];
+  char projector_name[32];
   clt_panel panel; /* as far as it is known before the rig is */
 } output_opened;
 
@@ -92,7 +92,7 @@ typedef struct output_frames {
 
 typedef enum measure_kind {
   MEASURE_NOTHING,
-  MEASURE_CALIBRATE,
+  MEASURE_CALIBRATE, /* camera and rig, where they are not open yet */
   MEASURE_ACQUIRE,
   MEASURE_VERIFY,
   MEASURE_REFINE,
@@ -147,6 +147,8 @@ typedef struct measure_result {
   measure_kind kind;
   uint64_t number;
   clt_error error;
+  bool closed;      /* the camera was lost, and must be opened again (CALIBRATE) */
+  char camera[32];  /* CALIBRATE: its driver */
   clt_rig_info rig; /* CALIBRATE; its texts are the two below */
   char response[32], source[CLT_TEXT_MAX];
   clt_transport *transport; /* ACQUIRE, PHOTOMETRY, CHANGED; NULL: the one in use fits */
@@ -180,7 +182,7 @@ typedef struct solver_job {
   int descriptor;                /* CONTENT: an open picture file; -1: go back to the configured one */
   char name[CLT_PATH_MAX];       /* CONTENT: what people call it */
   char configured[CLT_PATH_MAX]; /* CONTENT: what the configuration names */
-  int width, height, channels;   /* PREPARE: the panel; LOAD, SOLVE: the grid */
+  int width, height, channels;   /* PREPARE: the panel; LOAD (0: not known), SOLVE: the grid */
   char source[CLT_TEXT_MAX];     /* LOAD: the rig */
   clt_panel panel;               /* SNAPSHOT */
   char method[24];               /* SOLVE, ADOPT */

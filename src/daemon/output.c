@@ -13,7 +13,8 @@ static const double idle_refresh_s = 1.0 / 60, report_s = 0.25;
 struct output {
   const daemon_boxes *boxes;
   clt_station station;
-  bool open, stopping;
+  bool begun;          /* the station is */
+  bool open, stopping; /* the projector is open */
   clt_projector_info panel;
   clt_panel known;     /* the panel's light, as far as it is known before the rig is */
   output_drive *drive; /* the latest; survives a reopening */
@@ -35,15 +36,9 @@ clt_status output_create(const daemon_boxes *boxes, output **out, clt_error *err
   return CLT_OK;
 }
 
-static void close_station(output *main) {
-  clt_station_close(&main->station);
-  main->station = (clt_station){0};
-  main->open = main->measuring = false;
-}
-
 void output_destroy(output *main) {
   if (main != NULL) {
-    close_station(main);
+    clt_station_close(&main->station);
     output_drive_free(main->drive);
     free(main->codes);
     free(main);
@@ -80,23 +75,31 @@ static void report_opened(output *main, const clt_error *error) {
   if (main->open) {
     letter->projector = main->panel;
     snprintf(letter->projector_name, sizeof letter->projector_name, "%s", main->station.projector->driver->name);
-    snprintf(letter->camera_name, sizeof letter->camera_name, "%s", main->station.camera->driver->name);
     letter->panel = main->known;
   }
   daemon_report(main->boxes, main->boxes->opened, letter);
 }
 
-static void open_station(output *main, const clt_station_config *config) {
+static void open_projector(output *main, const clt_station_config *config) {
   clt_error error = {0};
-  if (!main->open && clt_station_open(config, &main->station, &error) == CLT_OK) {
+  main->begun = main->begun || clt_station_begin(config, &main->station, &error) == CLT_OK;
+  if (!main->open && main->begun && clt_station_open_projector(config, &main->station, &error) == CLT_OK) {
     main->open = true;
     main->station.projector->driver->describe(main->station.projector, &main->panel);
     main->known = clt_station_rig_config(config, &main->station).projector;
     encode_drive(main);
   }
-  if (error.status != CLT_OK) {
-    close_station(main);
-  }
+  report_opened(main, &error);
+}
+
+/* A projector that takes no picture any more is closed and reported, once. */
+static void lose_projector(output *main, const clt_error *cause) {
+  clt_error error = {0};
+  clt_fail(&error, CLT_GONE, "the projector takes no picture: %.400s", cause->message);
+  clt_station_close_projector(&main->station);
+  main->open = main->measuring = false;
+  free(main->codes);
+  main->codes = NULL;
   report_opened(main, &error);
 }
 
@@ -108,10 +111,7 @@ static void obey(output *main) {
   if (order->kind == OUTPUT_STOP) {
     main->stopping = true;
   } else {
-    if (order->kind == OUTPUT_REOPEN) {
-      close_station(main);
-    }
-    open_station(main, &order->station);
+    open_projector(main, &order->station);
   }
   free(order);
 }
@@ -128,25 +128,34 @@ static void take_drive(output *main) {
 static clt_status present(output *main, const float *codes, int64_t *shown_ns, clt_error *error) {
   clt_projector *projector = main->station.projector;
   if (!main->open) {
-    return clt_fail(error, CLT_GONE, "the projector is not open");
+    return clt_fail(error, CLT_FAILED, "the projector is not open");
   }
   clt_status status = projector->driver->present(projector, codes, shown_ns, error);
   main->frames.presented += status == CLT_OK;
   return status;
 }
 
-/* Shows a pattern at once and answers; or ends measuring, so that the drive is up again in this very turn. */
+/* Shows a pattern at once and answers; or ends measuring, so that the drive is up again in this very turn. To measure,
+ * CLT_GONE means its camera. */
 static void take_pattern(output *main, output_pattern *pattern) {
   output_answer *answer = pattern->codes != NULL ? clt_alloc(1, sizeof *answer) : NULL;
+  bool lost = false;
+  clt_error cause = {0};
   main->measuring = pattern->codes != NULL;
   if (answer != NULL) {
-    answer->error.status = present(main, pattern->codes, &answer->shown_ns, &answer->error);
+    if (present(main, pattern->codes, &answer->shown_ns, &answer->error) != CLT_OK) {
+      answer->error.status = CLT_FAILED;
+      lost = main->open;
+      cause = answer->error;
+    }
     clt_mailbox_put(main->boxes->answers, answer);
   }
   output_pattern_free(pattern);
+  if (lost) {
+    lose_projector(main, &cause);
+  }
 }
 
-/* A projector that takes no picture any more is reported once: it counts as closed from then on. */
 static void show_drive(output *main) {
   int64_t shown_ns;
   clt_error error = {0};
@@ -155,13 +164,9 @@ static void show_drive(output *main) {
   }
   if (present(main, main->codes, &shown_ns, &error) == CLT_OK) {
     main->frames.picture = true;
-    return;
+  } else {
+    lose_projector(main, &error);
   }
-  clt_log(CLT_LOG_ERROR, "the projector takes no picture: %s", error.message);
-  error.status = CLT_GONE;
-  free(main->codes);
-  main->codes = NULL;
-  report_opened(main, &error);
 }
 
 /* Reports now and then, and at once when the first picture is up. */

@@ -3,6 +3,7 @@
 
 #include "base/file.h"
 #include "daemon/control.h"
+#include "daemon/journal.h"
 
 /* A time as 2026-01-31T12:00:00Z. */
 static json_t *iso_time(time_t when) {
@@ -131,8 +132,8 @@ static json_t *devices_note(const control_findings *found) {
     return json_null();
   }
   const clt_projector_info *panel = &found->devices.projector;
-  return json_pack("{s:s, s:s, s:o, s:[i, i], s:f}", "projector", found->devices.projector_name, "camera",
-                   found->devices.camera_name, "source", text_or_null(found->source), "panel", panel->width,
+  return json_pack("{s:s, s:o, s:o, s:[i, i], s:f}", "projector", found->devices.projector_name, "camera",
+                   text_or_null(found->camera), "source", text_or_null(found->source), "panel", panel->width,
                    panel->height, "refresh_hz", panel->refresh_s > 0 ? 1 / panel->refresh_s : 0.0);
 }
 
@@ -177,4 +178,16 @@ void control_status_line(const control *self, char *line, size_t size) {
   } else {
     snprintf(line, size, "%s", name);
   }
+}
+
+void control_note(const control *self, clt_log_level level, const char *line) {
+  const control_findings *found = &self->found;
+  const journal_field fields[] = {
+      {"COUNTERLIGHT_STATE", machine_state_name(self->state)},
+      {"COUNTERLIGHT_WHY", self->why},
+      {"COUNTERLIGHT_CONTENT", found->content},
+      {"COUNTERLIGHT_PROJECTOR", found->open ? found->devices.projector_name : ""},
+      {"COUNTERLIGHT_CAMERA", found->camera},
+  };
+  journal_note(level, line, fields, sizeof fields / sizeof fields[0]);
 }
