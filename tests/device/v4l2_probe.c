@@ -1,7 +1,7 @@
 /* Drives one Video4Linux camera by lines of text, for the tests in the guest: one command a line on stdin, one JSON
  * object a line on stdout.
  *
- *   open DEVICE FORMAT WIDTH HEIGHT RATE GAIN WHITE FOCUS LINE
+ *   open DEVICE FORMAT WIDTH HEIGHT RATE GAIN WHITE FOCUS LINE          (a space in FORMAT is written "_")
  *   expose SECONDS | next NOT_BEFORE_NS TIMEOUT_S [FILE] | close | list | self */
 #include <dirent.h>
 #include <inttypes.h>
@@ -74,6 +74,9 @@ static void open_camera(const char *arguments, clt_camera **camera) {
   clt_camera_info info = {0};
   sscanf(arguments, "%1023s %7s %d %d %lf %lf %lf %lf %d", config.device, config.format, &config.width, &config.height,
          &config.rate_hz, &config.gain, &config.white_balance_k, &config.focus, &config.power_line_hz);
+  for (char *c = strchr(config.format, '_'); c != NULL; c = strchr(c, '_')) {
+    *c = ' ';
+  }
   clt_status status = clt_v4l2_open(&config, camera, &error);
   if (status == CLT_OK) {
     (*camera)->driver->describe(*camera, &info);
