@@ -7,6 +7,7 @@
 #define COUNTERLIGHT_DEVICE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "counterlight/panel.h"
@@ -83,13 +84,23 @@ typedef struct clt_projector_config {
  * gain_c(p) * linear(content_c(p)) + offset_c(p), clipped to 0..1, gain and offset interpolated bilinearly between the
  * centres of the cells. The panel's responses and crosstalk then give the codes, which are dithered to the glass. */
 typedef struct clt_live_picture {
-  int width, height;      /* of content, pixels: stretched over the whole panel */
+  int width, height;      /* of content, pixels: stretched over the whole panel; content_c(p) is its mean there, in
+                           * linear light (where it has as many pixels as the panel, its pixel) */
   const uint8_t *content; /* content[(y * width + x) * 3 + c], sRGB codes */
   int grid_width, grid_height;
   const float *gain, *offset; /* [(c * grid_height + y) * grid_width + x], three channels */
   clt_panel panel;
   uint32_t seed; /* of the dither; another for every frame */
 } clt_live_picture;
+
+/* Codes of a moving picture for a panel that cannot encode it by itself, not dithered: codes[(c * height + y) * width +
+ * x], 0..1, of `channels` (1 or 3) x height x width; a panel of one channel shows the content's luminance by the first
+ * gain and offset. Within 1e-4 of the formula above where responses are as clt_curve knows them. */
+CLT_PUBLIC clt_status clt_live_encode(const clt_live_picture *picture, int channels, int height, int width,
+                                      float *codes, clt_error *error);
+/* Brings codes to steps of 1 / (2^bits - 1), up or down by chance so that their mean stays: floor(code * full + u) /
+ * full, u uniform in 0..1, a function of seed and place. */
+CLT_PUBLIC void clt_live_dither(float *codes, size_t count, int bits, uint32_t seed);
 
 /* What a projector is. The panel shows code values; light = response(code). */
 typedef struct clt_projector_info {

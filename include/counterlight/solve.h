@@ -61,6 +61,8 @@ typedef struct clt_solve_options {
                        + sigma_T^2 ||x||^2), M lit rows, sigma_T from the transport's sigma, if `tolerance` asks for
                        less */
   double noise;     /* standard deviation of a wanted value (radiance), >= 0, for `discrepancy` */
+  bool trust;       /* a linear method that converged is believed: its own figure is the `residual` (of the wavelets a
+                       bound, kept to in 999 of 1000 solves), and no product with T is spent to measure it */
 } clt_solve_options;
 
 typedef struct clt_solve_result {
@@ -68,7 +70,8 @@ typedef struct clt_solve_result {
   char reason[320];       /* why this one, in one sentence; of auto with what it expected */
   int iterations;         /* the most that any channel took */
   long products;          /* with T or T', the most that any channel took; channels together count as one */
-  double residual;        /* ||T x - b|| / ||b|| over lit rows of every channel, of the x that is returned */
+  double residual;        /* ||T x - b|| / ||b|| over lit rows of every channel, of the x that is returned;
+                             measured at the end, if not by `trust` */
   double seconds;         /* wall time of the solve */
   double method_seconds;  /* of it, in the methods themselves: without the product that `residual` takes */
   double prepare_seconds; /* wall time that making the method ready took, once for every solve with the solver */

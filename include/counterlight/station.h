@@ -49,6 +49,20 @@ typedef struct clt_station {
 /* Opens the devices that config names, and loads its calibration. Of config.replay the frames are served and no device
  * is opened; a scene then gives no more than the rig's settings. */
 CLT_PUBLIC clt_status clt_station_open(const clt_station_config *config, clt_station *station, clt_error *error);
+
+/* The same one by one, for who must outlive a device that goes: first the scene and the calibration, then each device
+ * that is not open (one that is stays). A recording's two open together, with the projector (CLT_GONE for its camera
+ * where that was closed), and config.record is not regarded. Once it is begun, the projector and the camera with its
+ * rig may be opened, used and closed by two threads, each by one. */
+CLT_PUBLIC clt_status clt_station_begin(const clt_station_config *config, clt_station *station, clt_error *error);
+CLT_PUBLIC clt_status clt_station_open_projector(const clt_station_config *config, clt_station *station,
+                                                 clt_error *error);
+CLT_PUBLIC clt_status clt_station_open_camera(const clt_station_config *config, clt_station *station, clt_error *error);
+/* Closes the projector; a rig on it must be closed before. */
+CLT_PUBLIC void clt_station_close_projector(clt_station *station);
+/* Closes the rig and the camera. */
+CLT_PUBLIC void clt_station_close_camera(clt_station *station);
+
 /* The rig's settings: what the file says, where it says nothing the station's calibration, then the scene. */
 CLT_PUBLIC clt_rig_config clt_station_rig_config(const clt_station_config *config, const clt_station *station);
 /* Makes the rig on the station's camera and on `projector`, NULL meaning the station's own (a daemon that presents from

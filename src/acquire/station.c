@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "counterlight/replay.h"
+#include "device/camera/libcamera.h"
 #include "device/camera/v4l2.h"
 
 /* Where neither the file nor a scene says. */
@@ -48,10 +49,21 @@ static clt_status open_v4l2_camera(const clt_camera_config *config, clt_scene *s
 }
 #endif
 
+#ifdef CLT_HAVE_LIBCAMERA
+static clt_status open_libcamera_camera(const clt_camera_config *config, clt_scene *scene, clt_camera **out,
+                                        clt_error *error) {
+  (void)scene;
+  return clt_libcamera_camera_open(config, out, error);
+}
+#endif
+
 static const driver_entry drivers[] = {
     {"simulated", open_simulated_projector, open_simulated_camera},
 #ifdef CLT_HAVE_V4L2
     {"v4l2", NULL, open_v4l2_camera},
+#endif
+#ifdef CLT_HAVE_LIBCAMERA
+    {"libcamera", NULL, open_libcamera_camera},
 #endif
 };
 enum { DRIVERS = sizeof drivers / sizeof drivers[0] };
@@ -78,16 +90,51 @@ static clt_status find_driver(const char *name, bool camera, const driver_entry 
                   name, names);
 }
 
-static clt_status open_drivers(const clt_station_config *config, clt_station *station, clt_error *error) {
-  const driver_entry *projector = NULL, *camera = NULL;
-  clt_status status = find_driver(config->projector.driver, false, &projector, error);
-  if (status == CLT_OK) {
-    status = find_driver(config->camera.driver, true, &camera, error);
+static clt_status check_drivers(const clt_station_config *config, clt_error *error) {
+  const driver_entry *found = NULL;
+  clt_status status = find_driver(config->projector.driver, false, &found, error);
+  return status == CLT_OK ? find_driver(config->camera.driver, true, &found, error) : status;
+}
+
+clt_status clt_station_begin(const clt_station_config *config, clt_station *station, clt_error *error) {
+  *station = (clt_station){0};
+  clt_status status = config->replay[0] == '\0' ? check_drivers(config, error) : CLT_OK;
+  if (status == CLT_OK && config->calibration[0] != '\0') {
+    status = clt_calibration_load(config->calibration, &station->calibration, error);
   }
-  if (status == CLT_OK) {
-    status = projector->open_projector(&config->projector, station->scene, &station->projector, error);
+  if (status == CLT_OK && config->scene[0] != '\0') {
+    status = clt_scene_open(config->scene, &station->scene, error);
   }
-  return status == CLT_OK ? camera->open_camera(&config->camera, station->scene, &station->camera, error) : status;
+  if (status != CLT_OK) {
+    clt_station_close(station);
+  }
+  return status;
+}
+
+clt_status clt_station_open_projector(const clt_station_config *config, clt_station *station, clt_error *error) {
+  const driver_entry *driver = NULL;
+  if (station->projector != NULL) {
+    return CLT_OK;
+  }
+  if (config->replay[0] != '\0') {
+    clt_station_close_camera(station);
+    return clt_replay_open(config->replay, &station->projector, &station->camera, error);
+  }
+  clt_status status = find_driver(config->projector.driver, false, &driver, error);
+  return status == CLT_OK ? driver->open_projector(&config->projector, station->scene, &station->projector, error)
+                          : status;
+}
+
+clt_status clt_station_open_camera(const clt_station_config *config, clt_station *station, clt_error *error) {
+  const driver_entry *driver = NULL;
+  if (station->camera != NULL) {
+    return CLT_OK;
+  }
+  if (config->replay[0] != '\0') {
+    return clt_fail(error, CLT_GONE, "%s: a recording's camera opens with its projector only", config->replay);
+  }
+  clt_status status = find_driver(config->camera.driver, true, &driver, error);
+  return status == CLT_OK ? driver->open_camera(&config->camera, station->scene, &station->camera, error) : status;
 }
 
 /* Puts the recorder before the devices. */
@@ -101,18 +148,9 @@ static clt_status record_devices(const char *folder, clt_station *station, clt_e
 }
 
 clt_status clt_station_open(const clt_station_config *config, clt_station *station, clt_error *error) {
-  *station = (clt_station){0};
-  clt_status status = CLT_OK;
-  if (config->calibration[0] != '\0') {
-    status = clt_calibration_load(config->calibration, &station->calibration, error);
-  }
-  if (status == CLT_OK && config->scene[0] != '\0') {
-    status = clt_scene_open(config->scene, &station->scene, error);
-  }
-  if (status == CLT_OK) {
-    status = config->replay[0] != '\0' ? clt_replay_open(config->replay, &station->projector, &station->camera, error)
-                                       : open_drivers(config, station, error);
-  }
+  clt_status status = clt_station_begin(config, station, error);
+  status = status == CLT_OK ? clt_station_open_projector(config, station, error) : status;
+  status = status == CLT_OK ? clt_station_open_camera(config, station, error) : status;
   if (status == CLT_OK && config->record[0] != '\0') {
     status = record_devices(config->record, station, error);
   }
@@ -161,24 +199,40 @@ clt_status clt_station_open_rig(const clt_station_config *config, clt_station *s
                                                             : status;
 }
 
-static void close_devices(clt_projector *projector, clt_camera *camera) {
-  if (camera != NULL) {
-    camera->driver->close(camera);
+static void close_projector(clt_projector **projector) {
+  if (*projector != NULL) {
+    (*projector)->driver->close(*projector);
   }
-  if (projector != NULL) {
-    projector->driver->close(projector);
+  *projector = NULL;
+}
+
+static void close_camera(clt_camera **camera) {
+  if (*camera != NULL) {
+    (*camera)->driver->close(*camera);
   }
+  *camera = NULL;
+}
+
+void clt_station_close_projector(clt_station *station) {
+  close_projector(&station->projector);
+  close_projector(&station->recorded_projector);
+}
+
+void clt_station_close_camera(clt_station *station) {
+  if (station->rig != NULL) {
+    station->rig->operations->close(station->rig);
+  }
+  station->rig = NULL;
+  close_camera(&station->camera);
+  close_camera(&station->recorded_camera);
 }
 
 void clt_station_close(clt_station *station) {
   if (station == NULL) {
     return;
   }
-  if (station->rig != NULL) {
-    station->rig->operations->close(station->rig);
-  }
-  close_devices(station->projector, station->camera);
-  close_devices(station->recorded_projector, station->recorded_camera);
+  clt_station_close_camera(station);
+  clt_station_close_projector(station);
   clt_scene_close(station->scene);
   clt_calibration_destroy(station->calibration);
   *station = (clt_station){0};

@@ -4,25 +4,25 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "daemon/control.h"
+#include "daemon/geometry.h"
 
 /* Longest time from the wish to stop to the end, s; a solve that cannot be interrupted is left behind then. */
 static const double grace_s = 1.0;
 
-static void order(const control *self, output_order_kind kind) {
+/* The output does not turn while it obeys. */
+static void order(control *self, output_order_kind kind) {
   output_order *letter = clt_alloc(1, sizeof *letter);
   if (letter != NULL) {
     letter->kind = kind;
     letter->station = self->config.station;
+    notify_patience(&self->notify, true);
+    geometry_choose(self->config.state, &letter->station);
     clt_mailbox_put(self->boxes->orders, letter);
   }
 }
 
 static void open_devices(control *self) {
-  if (self->found.gone && self->work.measuring) {
-    self->wishes.open = true; /* the station is not closed under a thread that uses it */
-    return;
-  }
-  order(self, self->found.gone ? OUTPUT_REOPEN : OUTPUT_OPEN);
+  order(self, OUTPUT_OPEN);
 }
 
 /* A picture for the content as it is, unless there is one already; without a projector its size is not known. */
@@ -48,14 +48,9 @@ static void load(control *self) {
 
 /* Less than the whole transport is measured only where there is one of this rig to begin with. */
 static measure_kind scope(const control *self) {
-  const control_findings *found = &self->found;
-  bool less = self->wishes.scope == MEASURE_PHOTOMETRY || self->wishes.scope == MEASURE_CHANGED;
-  if (!less || found->model == NULL) {
-    return MEASURE_ACQUIRE;
-  }
-  clt_transport_info info = clt_transport_describe(found->model->transport);
-  bool fits = info.width == found->width && info.height == found->height && info.channels == found->channels;
-  return fits && info.rows == info.cols ? self->wishes.scope : MEASURE_ACQUIRE;
+  measure_kind wanted = self->wishes.scope;
+  bool less = wanted == MEASURE_PHOTOMETRY || wanted == MEASURE_CHANGED;
+  return wanted == MEASURE_GEOMETRY || (less && control_has_model(self)) ? wanted : MEASURE_ACQUIRE;
 }
 
 static void acquire(control *self) {
@@ -92,6 +87,7 @@ static void show(control *self) {
     return;
   }
   letter->panel = self->found.devices.panel;
+  letter->serial = self->found.picture_content;
   clt_mailbox_put(self->boxes->drives, letter);
 }
 
@@ -108,10 +104,14 @@ static void freeze(control *self) {
   sd_event_source_set_enabled(self->retry, SD_EVENT_OFF);
 }
 
+/* A picture for the content is put up meanwhile, and a stored transport serves without a camera too. */
 static void back_off(control *self) {
   double wait_s = machine_back_off(self->attempt, self->config.retry_least_s, self->config.retry_most_s);
   cancel(self);
   prepare(self);
+  if (self->found.open && self->found.model == NULL && self->config.reuse) {
+    control_want(self, SOLVER_LOAD);
+  }
   control_arm(self->retry, wait_s);
   clt_log(CLT_LOG_WARNING, "holding the last picture; next try in %g s", wait_s);
   self->attempt++;
@@ -122,6 +122,7 @@ static void stop(control *self) {
   freeze(self);
   control_arm(self->grace, grace_s);
   control_measure(self, MEASURE_STOP);
+  control_stop_moving(self);
   solver_job *job = clt_alloc(1, sizeof *job);
   if (job != NULL) {
     job->kind = SOLVER_STOP;

@@ -8,6 +8,7 @@
 #include "base/file.h"
 #include "base/places.h"
 #include "base/settings.h"
+#include "image/film.h"
 
 enum { METHOD_NAMES_MOST = 48 };
 
@@ -45,6 +46,14 @@ static void read_solve(clt_section section, daemon_config *config) {
   }
 }
 
+static void read_moving(clt_section section, daemon_config *config) {
+  static const char *const outs[] = {"clip", "scale", NULL};
+  config->live.budget_ms = clt_read_number(section, "budget_ms", 12, 0.1, 1000);
+  config->live.target_error = clt_read_number(section, "target_error", 0.005, 1e-5, 0.5);
+  config->reach = clt_read_choice(section, "out_of_reach", 0, outs) == 1;
+  config->picture_s = clt_read_number(section, "picture_seconds", 10, 0.1, 86400);
+}
+
 static void read_retry(clt_section section, daemon_config *config) {
   double limits[2] = {1, 60};
   clt_read_numbers(section, "retry_s", limits, 2, 2, 0.01, 86400);
@@ -75,8 +84,9 @@ static void read_section(clt_section section, const char *folder, daemon_config 
   snprintf(config->group, sizeof config->group, "%s", clt_read_text(section, "group", "counterlight", 63));
   read_policies(section, config);
   read_solve(section, config);
+  read_moving(section, config);
   if (config->content[0] == '\0') {
-    clt_section_fail(section, NULL, "needs content = \"picture.png\", the picture to show");
+    clt_section_fail(section, NULL, "needs content = \"picture.png\", what is to be shown");
   }
 }
 
@@ -136,7 +146,7 @@ clt_status daemon_config_read(const char *path, const daemon_overrides *override
 clt_status daemon_config_check(const daemon_config *config, clt_error *error) {
   clt_image picture = {0};
   clt_station station = {0};
-  clt_status status = clt_image_read(config->content, NULL, &picture, error);
+  clt_status status = clt_film_poster(config->content, &picture, error);
   clt_image_finish(&picture);
   status = status == CLT_OK ? clt_station_open(&config->station, &station, error) : status;
   status = status == CLT_OK ? clt_station_open_rig(&config->station, &station, NULL, error) : status;

@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 
+#include "counterlight/live.h"
 #include "counterlight/solve.h"
 #include "counterlight/station.h"
 
@@ -16,7 +17,10 @@ typedef struct daemon_config {
   char socket[CLT_PATH_MAX];  /* control socket */
   char state[CLT_PATH_MAX];   /* state directory */
   char group[64];             /* that may use the socket; empty: none */
-  char content[CLT_PATH_MAX]; /* the picture to show */
+  char content[CLT_PATH_MAX]; /* the picture to show, or the film (image/film.h) */
+  clt_live_options live;      /* of a film's frames */
+  bool reach;                 /* they are scaled and lifted so that every cell can be reached */
+  double picture_s;           /* that each picture of a folder is shown */
   bool reuse;                 /* at start a stored transport is used (else a new one is measured) */
   double verify_s;            /* time between verifications, s; 0: none */
   double reacquire_error;     /* a verified error above which the transport is measured again; 0: never */

@@ -1,4 +1,4 @@
-/* The content: the picture that is to appear. */
+/* The content: the picture that is to appear; of a film, its first frame. */
 #ifndef CLT_DAEMON_CONTENT_H
 #define CLT_DAEMON_CONTENT_H
 

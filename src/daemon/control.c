@@ -17,7 +17,9 @@ void control_arm(sd_event_source *timer, double seconds) {
 
 void control_blame(control *self, const clt_error *error) {
   snprintf(self->why, sizeof self->why, "%s", error->message);
-  clt_log(CLT_LOG_ERROR, "%s: %s", machine_state_name(self->state), error->message);
+  char line[CLT_MESSAGE_MAX + 32];
+  snprintf(line, sizeof line, "%s: %s", machine_state_name(self->state), error->message);
+  control_note(self, CLT_LOG_ERROR, line);
 }
 
 /* What follows from having come into a state, whichever way. */
@@ -33,7 +35,7 @@ static void arrive(control *self) {
   }
   control_status_line(self, line, sizeof line);
   notify_status(line);
-  clt_log(CLT_LOG_INFO, "%s", line);
+  control_note(self, CLT_LOG_INFO, line);
   server_notify(self->service, "state", control_state_note(self));
 }
 
@@ -111,6 +113,7 @@ static int on_signal(sd_event_source *source, const struct signalfd_siginfo *sig
 static void take_frames(control *self, output_frames *letter) {
   bool first = letter->picture && !self->found.frames.picture;
   self->found.frames = *letter;
+  notify_turns(&self->notify, letter->turns);
   if (first) {
     char line[CLT_MESSAGE_MAX];
     notify_picture(&self->notify);
@@ -157,6 +160,11 @@ static int on_wake(sd_event_source *source, int descriptor, uint32_t events, voi
     control_on_solved(self, solved);
     solver_result_free(solved);
   }
+  moving_report *moved = clt_mailbox_take(boxes->moved, 0);
+  if (moved != NULL) {
+    control_on_moved(self, moved);
+    free(moved);
+  }
   output_frames *frames = clt_mailbox_take(boxes->frames, 0);
   if (frames != NULL) {
     take_frames(self, frames);
@@ -174,14 +182,6 @@ static int on_retry(sd_event_source *source, uint64_t usec, void *userdata) {
 static int on_verify(sd_event_source *source, uint64_t usec, void *userdata) {
   (void)source, (void)usec;
   control_event(userdata, EVENT_VERIFY);
-  return 0;
-}
-
-static int on_watchdog(sd_event_source *source, uint64_t usec, void *userdata) {
-  (void)usec;
-  control *self = userdata;
-  notify_watchdog(&self->notify, self->found.frames.turns, self->state == STATE_OPENING);
-  control_arm(source, (double)self->notify.watchdog_usec * 0.5e-6);
   return 0;
 }
 
@@ -209,8 +209,7 @@ static int add_sources(control *self) {
   const struct {
     sd_event_source **timer;
     sd_event_time_handler_t handler;
-  } timers[] = {
-      {&self->retry, on_retry}, {&self->verify, on_verify}, {&self->watchdog, on_watchdog}, {&self->grace, on_grace}};
+  } timers[] = {{&self->retry, on_retry}, {&self->verify, on_verify}, {&self->grace, on_grace}};
   for (size_t i = 0; outcome >= 0 && i < sizeof timers / sizeof timers[0]; i++) {
     outcome = add_timer(self, timers[i].timer, timers[i].handler);
   }
@@ -255,9 +254,6 @@ void *control_run(void *data) {
   const char *socket = self->listening->bound ? self->listening->path : "passed by systemd";
   clt_log(CLT_LOG_NOTICE, "counterlightd %s: configuration %s, control socket %s, state directory %s", CLT_VERSION,
           self->config.path, socket, self->config.state);
-  if (self->notify.watchdog_usec > 0) {
-    control_arm(self->watchdog, 0);
-  }
   control_act(self, ACTION_OPEN);
   sd_event_loop(self->loop);
   return NULL;
@@ -268,7 +264,7 @@ void control_destroy(control *self) {
     return;
   }
   sd_event_source *sources[] = {self->wake,  self->signals[0], self->signals[1], self->signals[2],
-                                self->retry, self->verify,     self->watchdog,   self->grace};
+                                self->retry, self->verify,     self->grace};
   server_destroy(self->service);
   for (size_t i = 0; i < sizeof sources / sizeof sources[0]; i++) {
     sd_event_source_disable_unref(sources[i]);

@@ -1,6 +1,7 @@
 /* The control loop: owns the state machine and decides what the other threads do. One struct, these files:
  * control.c (events of the loop), actions.c (what the machine's actions do), jobs.c (work given to the other threads
- * and its answers), verdicts.c (what photographs say), methods.c (what clients may ask), report.c (what they are told).
+ * and its answers), plays.c (content that moves), verdicts.c (what photographs say), methods.c (what clients may ask),
+ * report.c (what they are told).
  */
 #ifndef CLT_DAEMON_CONTROL_H
 #define CLT_DAEMON_CONTROL_H
@@ -8,6 +9,7 @@
 #include <systemd/sd-event.h>
 #include <time.h>
 
+#include "base/log.h"
 #include "daemon/config.h"
 #include "daemon/letters.h"
 #include "daemon/listen.h"
@@ -24,6 +26,7 @@ typedef struct control_wishes {
   unsigned solver;        /* bit set of solver_kind */
   bool acquire;           /* a new transport is owed, through failures and retries, until it serves */
   measure_kind scope;     /* of that: MEASURE_PHOTOMETRY, MEASURE_CHANGED, else all of it */
+  measure_kind scope;     /* of that: MEASURE_PHOTOMETRY, MEASURE_CHANGED, MEASURE_GEOMETRY, else all of it */
   bool open;              /* devices to be opened again once `measure` is idle */
   bool refine;            /* asked for, at the next verification */
   bool snapshot;          /* to be written when the picture has been photographed */
@@ -39,15 +42,17 @@ typedef struct control_work {
   uint64_t measure_number; /* newest job of measure */
   bool measuring, solving; /* its answer is not here yet */
   solver_kind solver_kind; /* of the job that is being solved */
+  bool rigless;            /* it looks for a transport before the rig is known */
   uint64_t content_ticket, snapshot_ticket;
+  moving_job playing; /* the last one given to moving; its model is for comparison only */
 } control_work;
 
 /* What they found. */
 typedef struct control_findings {
-  bool open; /* the devices are */
-  bool gone; /* and must be closed before they are opened again */
+  bool open; /* the projector is */
   output_opened devices;
-  bool calibrated;
+  char camera[32];             /* its driver; empty while it is not open */
+  bool calibrated;             /* what follows is known */
   int width, height, channels; /* of the grid */
   char response[32], source[CLT_TEXT_MAX];
   transport_facts transport;
@@ -67,6 +72,7 @@ typedef struct control_findings {
   clt_fit fit;
   refinement refined; /* of the picture that is up; photographs 0: as it was solved for */
   output_frames frames;
+  moving_report moved; /* serial 0: nothing moves yet */
   measure_progress progress;
 } control_findings;
 
@@ -76,7 +82,7 @@ typedef struct control {
   daemon_overrides overrides;
   daemon_config config;
   sd_event *loop;
-  sd_event_source *wake, *signals[3], *retry, *verify, *watchdog, *grace;
+  sd_event_source *wake, *signals[3], *retry, *verify, *grace;
   server *service;
   notifier notify;
   machine_state state;
@@ -110,6 +116,8 @@ clt_status control_reload(control *self, const char **restart, clt_error *error)
 void control_act(control *self, machine_action action);
 
 /* jobs.c */
+/* Whether there is a square transport of the rig's grid. */
+bool control_has_model(const control *self);
 void control_measure(control *self, measure_kind kind);
 void control_want(control *self, solver_kind kind);
 /* Tells the solver to give up what can wait. */
@@ -120,6 +128,11 @@ void control_on_opened(control *self, output_opened *letter);
 void control_on_measured(control *self, measure_result *letter);
 void control_on_solved(control *self, solver_result *letter);
 void control_finish_jobs(control *self);
+
+/* plays.c: has the content move, where it does and that is not so yet; ends that with the daemon. */
+void control_play(control *self);
+void control_stop_moving(control *self);
+void control_on_moved(control *self, const moving_report *letter);
 
 /* verdicts.c */
 void control_on_verification(control *self, measure_result *letter);
@@ -140,8 +153,12 @@ json_t *control_drift_note(const control *self);
 json_t *control_renewed_note(const control *self);
 /* Paths of the last snapshot. */
 json_t *control_snapshot_note(const control *self);
+/* How the film plays; null where nothing moves. */
+json_t *control_moving_note(const control *self);
 json_t *control_progress_note(const measure_progress *progress);
 /* One line for systemd's STATUS= and the log. */
 void control_status_line(const control *self, char *line, size_t size);
+/* Logs a line; the journal gets state, reason, content and devices as fields of their own. */
+void control_note(const control *self, clt_log_level level, const char *line);
 
 #endif

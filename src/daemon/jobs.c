@@ -7,6 +7,17 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "daemon/control.h"
+#include "daemon/geometry.h"
+
+bool control_has_model(const control *self) {
+  const control_findings *found = &self->found;
+  if (found->model == NULL) {
+    return false;
+  }
+  clt_transport_info info = clt_transport_describe(found->model->transport);
+  return info.width == found->width && info.height == found->height && info.channels == found->channels &&
+         info.rows == info.cols;
+}
 
 void control_measure(control *self, measure_kind kind) {
   measure_job *job = clt_alloc(1, sizeof *job);
@@ -25,8 +36,9 @@ void control_measure(control *self, measure_kind kind) {
     clt_log(CLT_LOG_ERROR, "the picture cannot be verified: %s", error.message);
     job->kind = MEASURE_NOTHING;
   }
-  bool modelled = pictured || kind == MEASURE_PHOTOMETRY || kind == MEASURE_CHANGED;
-  job->model = modelled ? model_hold(self->found.model) : NULL;
+  bool renewed = kind == MEASURE_PHOTOMETRY || kind == MEASURE_CHANGED || kind == MEASURE_GEOMETRY;
+  job->model = pictured || (renewed && control_has_model(self)) ? model_hold(self->found.model) : NULL;
+  geometry_file(self->config.state, job->calibration);
   self->work.measure_number = job->number;
   self->work.measuring = true;
   clt_mailbox_put(self->boxes->measure_jobs, job);
@@ -69,6 +81,13 @@ static clt_status fill(control *self, solver_job *job, clt_error *error) {
     return CLT_OK;
   case SOLVER_SNAPSHOT:
     return fill_snapshot(self, job, error);
+  case SOLVER_LOAD:
+    fill_solve(self, job);
+    self->work.rigless = !self->found.calibrated;
+    if (self->work.rigless) {
+      job->width = job->height = job->channels = 0;
+    }
+    return CLT_OK;
   case SOLVER_ADOPT:
     job->transport = self->wishes.transport;
     self->wishes.transport = NULL;
@@ -130,15 +149,15 @@ void control_want(control *self, solver_kind kind) {
 }
 
 void control_on_opened(control *self, output_opened *letter) {
+  notify_patience(&self->notify, self->state == STATE_STOPPING);
   if (letter->error.status == CLT_OK) {
     self->found.devices = *letter;
     self->found.open = true;
-    self->found.gone = false;
+    control_play(self);
     control_event(self, EVENT_OPENED);
     return;
   }
   bool lost = letter->error.status == CLT_GONE && self->found.open;
-  self->found.gone = self->found.gone || lost;
   self->found.open = self->found.calibrated = false;
   control_blame(self, &letter->error);
   control_event(self, lost ? EVENT_LOST : EVENT_FAILED);
@@ -146,6 +165,7 @@ void control_on_opened(control *self, output_opened *letter) {
 
 static void take_rig(control *self, const measure_result *letter) {
   control_findings *found = &self->found;
+  memcpy(found->camera, letter->camera, sizeof found->camera);
   found->width = letter->rig.width;
   found->height = letter->rig.height;
   found->channels = letter->rig.channels;
@@ -169,6 +189,7 @@ static void take_measured(control *self, measure_result *letter) {
     break;
   case MEASURE_PHOTOMETRY:
   case MEASURE_CHANGED:
+  case MEASURE_GEOMETRY:
     control_on_renewal(self, letter);
     take_transport(self, letter);
     break;
@@ -191,14 +212,12 @@ void control_on_measured(control *self, measure_result *letter) {
     return;
   }
   self->work.measuring = false;
-  if (self->wishes.open) {
-    self->wishes.open = false;
-    control_act(self, ACTION_OPEN);
-  }
   if (letter->error.status == CLT_OK) {
     take_measured(self, letter);
   } else if (letter->error.status != CLT_CANCELLED) {
-    self->found.gone = self->found.gone || letter->error.status == CLT_GONE;
+    if (letter->closed) {
+      self->found.camera[0] = '\0';
+    }
     control_blame(self, &letter->error);
     control_event(self, EVENT_FAILED);
   }
@@ -250,7 +269,11 @@ static void take_loaded(control *self, const solver_result *letter) {
   if (letter->error.status != CLT_OK) {
     clt_log(CLT_LOG_WARNING, "the stored transport cannot be used: %s", letter->error.message);
   }
-  control_event(self, letter->facts.present ? EVENT_LOADED : EVENT_UNKNOWN);
+  if (!self->work.rigless) {
+    control_event(self, letter->facts.present ? EVENT_LOADED : EVENT_UNKNOWN);
+  } else if (letter->facts.present) {
+    control_want(self, SOLVER_SOLVE); /* to be shown until the rig says whether it fits */
+  }
 }
 
 static void take_prepared(control *self, solver_result *letter) {
@@ -314,6 +337,7 @@ void control_on_solved(control *self, solver_result *letter) {
   default:
     break;
   }
+  control_play(self);
   pump(self);
 }
 

@@ -17,6 +17,8 @@ clt_status daemon_boxes_init(daemon_boxes *boxes, clt_error *error) {
   } wanted[] = {
       {&boxes->orders, free},
       {&boxes->drives, output_drive_free},
+      {&boxes->moving, output_moving_free},
+      {&boxes->spares, output_moving_free},
       {&boxes->patterns, output_pattern_free},
       {&boxes->answers, free},
       {&boxes->opened, free},
@@ -25,6 +27,8 @@ clt_status daemon_boxes_init(daemon_boxes *boxes, clt_error *error) {
       {&boxes->progress, free},
       {&boxes->measured, measure_result_free},
       {&boxes->solver_jobs, solver_job_free},
+      {&boxes->moving_jobs, moving_job_free},
+      {&boxes->moved, free},
       {&boxes->haste, free},
       {&boxes->solved, solver_result_free},
   };
@@ -38,9 +42,10 @@ clt_status daemon_boxes_init(daemon_boxes *boxes, clt_error *error) {
 }
 
 void daemon_boxes_finish(daemon_boxes *boxes) {
-  clt_mailbox *all[] = {boxes->orders,   boxes->drives,      boxes->patterns, boxes->answers,
-                        boxes->opened,   boxes->frames,      boxes->progress, boxes->measure_jobs,
-                        boxes->measured, boxes->solver_jobs, boxes->haste,    boxes->solved};
+  clt_mailbox *all[] = {boxes->orders,   boxes->drives,      boxes->patterns,    boxes->answers,
+                        boxes->opened,   boxes->frames,      boxes->progress,    boxes->measure_jobs,
+                        boxes->measured, boxes->solver_jobs, boxes->haste,       boxes->solved,
+                        boxes->moving,   boxes->spares,      boxes->moving_jobs, boxes->moved};
   for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
     clt_mailbox_destroy(all[i]);
   }
@@ -97,6 +102,23 @@ void output_pattern_free(void *letter) {
   output_pattern *gone = letter;
   if (gone != NULL) {
     free(gone->codes);
+    free(gone);
+  }
+}
+
+void output_moving_free(void *letter) {
+  output_moving *gone = letter;
+  if (gone != NULL) {
+    free(gone->content);
+    free(gone->fields);
+    free(gone);
+  }
+}
+
+void moving_job_free(void *letter) {
+  moving_job *gone = letter;
+  if (gone != NULL) {
+    model_drop(gone->model);
     free(gone);
   }
 }

@@ -1,10 +1,13 @@
 /* The daemon's threads, who owns what, and the letters between them.
  *
- *   main      (output.c)   opens and closes the station, owns the projector, presents; never waits for another thread
- *                          for longer than one refresh
- *   measure   (measure.c)  owns the station's camera and rig while it works on a job; its rig projects through a
- *                          stand-in (standin.c) that hands each pattern to main
+ *   main      (output.c)   begins and ends the station, owns the projector (opens it, closes it where it is lost),
+ *                          presents; never waits for another thread for longer than one refresh
+ *   measure   (measure.c)  owns the station's camera and rig (opens them, closes them where the camera is lost); the
+ *                          rig projects through a stand-in (standin.c) that hands each pattern to main
  *   solver    (solver.c)   owns the content, the transport with its certificate, and the files of the state directory
+ *   moving    (moving.c)   owns the film that plays (player.c, with a thread that decodes) and makes a moving picture
+ *                          of each frame
+ *                          (calibration.h5 is measure's)
  *   control   (control.c)  owns the state machine, the control socket, signals, timers and the watchdog; decides what
  *                          the others do and keeps copies of what they found
  *
@@ -28,6 +31,8 @@
 typedef struct daemon_boxes {
   clt_mailbox *orders;       /* control -> main: output_order */
   clt_mailbox *drives;       /* control -> main: output_drive */
+  clt_mailbox *moving;       /* moving -> main: output_moving */
+  clt_mailbox *spares;       /* main -> moving: output_moving, to be filled again */
   clt_mailbox *patterns;     /* measure -> main: output_pattern */
   clt_mailbox *answers;      /* main -> measure: output_answer */
   clt_mailbox *opened;       /* main -> control: output_opened */
@@ -36,6 +41,8 @@ typedef struct daemon_boxes {
   clt_mailbox *progress;     /* measure -> control: measure_progress */
   clt_mailbox *measured;     /* measure -> control: measure_result */
   clt_mailbox *solver_jobs;  /* control -> solver: solver_job */
+  clt_mailbox *moving_jobs;  /* control -> moving: moving_job */
+  clt_mailbox *moved;        /* moving -> control: moving_report */
   clt_mailbox *haste;        /* control -> solver: solver_haste */
   clt_mailbox *solved;       /* solver -> control: solver_result */
   int wake;                  /* eventfd, non-blocking */
@@ -48,9 +55,9 @@ void daemon_report(const daemon_boxes *boxes, clt_mailbox *box, void *letter);
 
 /* --- main --- */
 
-typedef enum output_order_kind { OUTPUT_OPEN, OUTPUT_REOPEN, OUTPUT_STOP } output_order_kind;
+typedef enum output_order_kind { OUTPUT_OPEN, OUTPUT_STOP } output_order_kind;
 typedef struct output_order {
-  output_order_kind kind; /* OPEN: where it is not open yet; REOPEN: close first (only while measure has no job) */
+  output_order_kind kind; /* OPEN: the projector, where it is not open yet */
   clt_station_config station;
 } output_order;
 
@@ -58,7 +65,17 @@ typedef struct output_order {
 typedef struct output_drive {
   clt_image drive;
   clt_panel panel; /* that it is for */
+  uint64_t serial; /* of its content */
 } output_drive;
+
+/* A moving picture to show from now on, unless a drive for newer content is there. Its arrays are the letter's. */
+typedef struct output_moving {
+  uint64_t serial; /* of its content */
+  clt_live_picture picture;
+  uint8_t *content;
+  float *fields;                    /* gain, then offset */
+  size_t content_room, fields_room; /* bytes */
+} output_moving;
 
 /* A picture of panel codes to show at once and until the next pattern; without codes: measuring has ended, the drive
  * comes back. */
@@ -70,12 +87,12 @@ typedef struct output_answer {
   clt_error error; /* status CLT_OK: it is on the glass */
 } output_answer;
 
-/* What became of opening the devices, or (CLT_GONE) that the projector is no longer there. */
+/* What became of opening the projector, or (CLT_GONE) that it is no longer there and was closed. */
 typedef struct output_opened {
-  clt_error error; /* CLT_OK: open */
-  clt_station *station;
+  clt_error error;      /* CLT_OK: open */
+  clt_station *station; /* begun; its camera and rig are for measure */
   clt_projector_info projector;
-  char projector_name[32], camera_name[32];
+  char projector_name[32];
   clt_panel panel; /* as far as it is known before the rig is */
 } output_opened;
 
@@ -92,12 +109,13 @@ typedef struct output_frames {
 
 typedef enum measure_kind {
   MEASURE_NOTHING,
-  MEASURE_CALIBRATE,
+  MEASURE_CALIBRATE, /* camera and rig, where they are not open yet */
   MEASURE_ACQUIRE,
   MEASURE_VERIFY,
   MEASURE_REFINE,
   MEASURE_PHOTOMETRY, /* black and gain anew */
   MEASURE_CHANGED,    /* what changed anew, by a few photographs where they explain it */
+  MEASURE_GEOMETRY,   /* what each camera pixel sees anew, then as MEASURE_CHANGED */
   MEASURE_STOP
 } measure_kind;
 
@@ -118,7 +136,9 @@ typedef struct measure_job {
   clt_station *station;         /* CALIBRATE */
   clt_projector_info projector; /* CALIBRATE */
   daemon_picture picture;       /* VERIFY, REFINE */
-  daemon_model *model;          /* VERIFY, REFINE, PHOTOMETRY, CHANGED; held; NULL: none in hand */
+  daemon_model *model;          /* VERIFY, REFINE, PHOTOMETRY, CHANGED, GEOMETRY; held; NULL: none in hand */
+
+  char calibration[CLT_PATH_MAX]; /* GEOMETRY: file for the new one */
 } measure_job;
 
 typedef struct measure_progress {
@@ -134,6 +154,14 @@ typedef struct refinement {
   double before, after, noise;
 } refinement;
 
+/* What came of measuring the geometry again. */
+typedef struct geometry_renewal {
+  bool measured, adopted; /* not adopted: the earlier one is better, and why says so */
+  double covered;         /* share of the panel that is seen */
+  double moved;           /* camera pixels, median */
+  char why[CLT_MESSAGE_MAX];
+} geometry_renewal;
+
 typedef enum renew_outcome { RENEW_NONE, RENEW_FITS, RENEW_GAIN, RENEW_REPAINT, RENEW_MEASURE } renew_outcome;
 /* What was found to have changed; before and after: of the photograph that fits worst. */
 typedef struct renewal {
@@ -141,16 +169,19 @@ typedef struct renewal {
   int patterns; /* that it took, those of a whole acquisition included */
   size_t rows;  /* REPAINT: that got a factor of their own, of all channels */
   clt_fit before, after;
+  geometry_renewal geometry; /* of MEASURE_GEOMETRY; where it is not adopted, nothing else was looked at */
 } renewal;
 
 typedef struct measure_result {
   measure_kind kind;
   uint64_t number;
   clt_error error;
+  bool closed;      /* the camera was lost, and must be opened again (CALIBRATE) */
+  char camera[32];  /* CALIBRATE: its driver */
   clt_rig_info rig; /* CALIBRATE; its texts are the two below */
   char response[32], source[CLT_TEXT_MAX];
-  clt_transport *transport; /* ACQUIRE, PHOTOMETRY, CHANGED; NULL: the one in use fits */
-  renewal renewed;          /* PHOTOMETRY, CHANGED */
+  clt_transport *transport; /* ACQUIRE, PHOTOMETRY, CHANGED, GEOMETRY; NULL: the one in use fits */
+  renewal renewed;          /* PHOTOMETRY, CHANGED, GEOMETRY */
   clt_image observation;    /* VERIFY, REFINE: radiance */
   double verified_error;    /* VERIFY, REFINE: ||y - target|| / ||target|| over lit cells */
   refinement refined;       /* REFINE */
@@ -180,7 +211,7 @@ typedef struct solver_job {
   int descriptor;                /* CONTENT: an open picture file; -1: go back to the configured one */
   char name[CLT_PATH_MAX];       /* CONTENT: what people call it */
   char configured[CLT_PATH_MAX]; /* CONTENT: what the configuration names */
-  int width, height, channels;   /* PREPARE: the panel; LOAD, SOLVE: the grid */
+  int width, height, channels;   /* PREPARE: the panel; LOAD (0: not known), SOLVE: the grid */
   char source[CLT_TEXT_MAX];     /* LOAD: the rig */
   clt_panel panel;               /* SNAPSHOT */
   char method[24];               /* SOLVE, ADOPT */
@@ -214,6 +245,29 @@ typedef struct solver_result {
   daemon_model *model;        /* in use, held; NULL: none */
 } solver_result;
 
+/* --- moving --- */
+
+/* What is to move from now on. */
+typedef struct moving_job {
+  bool stop;               /* the daemon ends */
+  uint64_t serial;         /* of the content */
+  char path[CLT_PATH_MAX]; /* of the film; empty: nothing moves */
+  clt_projector_info projector;
+  clt_panel panel;
+  daemon_model *model;       /* held; NULL: shown uncompensated */
+  clt_frames_options frames; /* live.budget_ms: of a frame's solve */
+  double picture_s;          /* that each picture of a folder is shown */
+} moving_job;
+
+typedef struct moving_report {
+  uint64_t serial;                /* of the content */
+  uint64_t frames, late, skipped; /* of the film: shown; ready more than a refresh after they were due; passed over */
+  double fps;                     /* over the last report's time */
+  bool compensated;
+  double ms;              /* that the last frame took */
+  clt_frames_result last; /* of that, where it is compensated */
+} moving_report;
+
 /* Deep copy; `to` is overwritten. CLT_FAILED where memory is short (then `to` is empty). */
 clt_status daemon_picture_copy(const daemon_picture *from, daemon_picture *to, clt_error *error);
 void daemon_picture_finish(daemon_picture *picture); /* accepts an empty one */
@@ -222,6 +276,8 @@ clt_status daemon_image_copy(const clt_image *from, clt_image *to, clt_error *er
 /* Frees of letters that hold more than themselves; each accepts NULL. */
 void output_drive_free(void *letter);
 void output_pattern_free(void *letter);
+void output_moving_free(void *letter);
+void moving_job_free(void *letter);
 void measure_job_free(void *letter);
 void measure_result_free(void *letter);
 void solver_job_free(void *letter);

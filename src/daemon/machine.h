@@ -6,8 +6,8 @@
 #include <stdio.h>
 
 typedef enum machine_state {
-  STATE_OPENING,     /* the devices are being opened */
-  STATE_CALIBRATING, /* the rig is being made ready, then a stored transport looked for */
+  STATE_OPENING,     /* the projector is being opened */
+  STATE_CALIBRATING, /* camera and rig are being made ready, then a stored transport looked for */
   STATE_ACQUIRING,   /* the transport is being measured */
   STATE_SOLVING,     /* the drive is being computed from a transport in hand */
   STATE_SHOWING,     /* the compensated picture is up and nothing else goes on */
@@ -18,8 +18,8 @@ typedef enum machine_state {
 } machine_state;
 
 typedef enum machine_event {
-  EVENT_OPENED,     /* projector and camera are open */
-  EVENT_CALIBRATED, /* the rig is ready: grid and response are known */
+  EVENT_OPENED,     /* the projector is open */
+  EVENT_CALIBRATED, /* camera and rig are ready: grid and response are known */
   EVENT_LOADED,     /* a transport that fits is in hand */
   EVENT_UNKNOWN,    /* there is none, or the configuration wants a new one */
   EVENT_ACQUIRED,   /* a new transport was measured */
@@ -43,8 +43,8 @@ typedef enum machine_action {
   ACTION_UNDEFINED, /* an entry that the table leaves out; machine_step never gives it */
   ACTION_IGNORE,    /* the event means nothing here */
   ACTION_REFUSE,    /* whoever asked is told that it cannot be done in this state */
-  ACTION_OPEN,      /* open the devices, where they are not */
-  ACTION_BEGIN,     /* put up the last drive, or the uncompensated picture, and make the rig ready */
+  ACTION_OPEN,      /* open the projector, where it is not */
+  ACTION_BEGIN,     /* put up the last drive, or the uncompensated picture; open the camera, make the rig ready */
   ACTION_PREPARE,   /* put up the uncompensated picture until there is something better */
   ACTION_LOAD,      /* look for a stored transport */
   ACTION_ACQUIRE,   /* measure a new transport; a running verification is given up */

@@ -12,6 +12,7 @@
 #include "base/places.h"
 #include "daemon/control.h"
 #include "daemon/measure.h"
+#include "daemon/moving.h"
 #include "daemon/options.h"
 #include "daemon/output.h"
 #include "daemon/probe.h"
@@ -76,9 +77,10 @@ static void close_parts(daemon_parts *parts) {
 /* Presents until the order to stop, then waits for the other threads: measure first, which may be waiting for a pattern
  * to be shown; control last, which ends the process where that takes too long. */
 static clt_status run_threads(daemon_parts *parts, clt_error *error) {
-  pthread_t measuring, solving, controlling;
+  pthread_t measuring, solving, moving, controlling;
   if (pthread_create(&measuring, NULL, measure_run, &parts->boxes) != 0 ||
       pthread_create(&solving, NULL, solver_run, &parts->solving) != 0 ||
+      pthread_create(&moving, NULL, moving_run, &parts->boxes) != 0 ||
       pthread_create(&controlling, NULL, control_run, parts->controlling) != 0) {
     return clt_fail(error, CLT_FAILED, "a thread cannot be started; the system is short of memory or processes");
   }
@@ -86,6 +88,7 @@ static clt_status run_threads(daemon_parts *parts, clt_error *error) {
   clt_mailbox_close(parts->boxes.answers);
   pthread_join(measuring, NULL);
   pthread_join(solving, NULL);
+  pthread_join(moving, NULL);
   output_frames *last = clt_alloc(1, sizeof *last);
   if (last != NULL) {
     last->ended = true;

@@ -8,6 +8,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "daemon/geometry.h"
 #include "daemon/refine.h"
 #include "daemon/renew.h"
 #include "daemon/standin.h"
@@ -17,10 +18,11 @@ static const double progress_s = 0.05;
 
 typedef struct measurer {
   const daemon_boxes *boxes;
-  clt_station *station;   /* lent by main from calibration on */
-  clt_projector *standin; /* outlives the station's rig */
-  measure_job *waiting;   /* came while another was worked on */
-  uint64_t number;        /* of the job in work */
+  clt_station *station;     /* lent by main from calibration on */
+  clt_projector *standin;   /* outlives the station's rig */
+  clt_projector_info panel; /* that the rig was made for */
+  measure_job *waiting;     /* came while another was worked on */
+  uint64_t number;          /* of the job in work */
   int64_t reported_ns;
 } measurer;
 
@@ -50,24 +52,46 @@ static bool on_progress(void *context, const clt_progress *progress) {
   return !cancelled(self);
 }
 
-/* The rig on main's station; one that is open already stays. */
-static clt_status calibrate(measurer *self, const measure_job *job, measure_result *result) {
-  clt_station *station = job->station;
-  if (station->rig == NULL) {
-    if (self->standin != NULL) {
-      self->standin->driver->close(self->standin);
-      self->standin = NULL;
-    }
-    clt_status status = standin_create(self->boxes, &job->projector, &self->standin, &result->error);
-    if (status != CLT_OK) {
-      return status;
-    }
-    status = clt_station_open_rig(&job->config, station, self->standin, &result->error);
-    if (status != CLT_OK) {
-      return status;
-    }
+static void close_camera(measurer *self) {
+  if (self->station != NULL) {
+    clt_station_close_camera(self->station);
   }
-  self->station = station;
+  if (self->standin != NULL) {
+    self->standin->driver->close(self->standin);
+  }
+  self->standin = NULL;
+}
+
+static bool is_same_panel(const clt_projector_info *a, const clt_projector_info *b) {
+  return a->width == b->width && a->height == b->height && a->channels == b->channels;
+}
+
+/* Camera and rig on main's station; what is open already stays, unless the projector came back with another panel. */
+static clt_status open_camera(measurer *self, const measure_job *job, clt_error *error) {
+  clt_station *station = self->station = job->station;
+  if (station->rig != NULL && !is_same_panel(&self->panel, &job->projector)) {
+    close_camera(self);
+  }
+  clt_status status = clt_station_open_camera(&job->config, station, error);
+  if (status != CLT_OK || station->rig != NULL) {
+    return status;
+  }
+  if (self->standin != NULL) {
+    self->standin->driver->close(self->standin);
+    self->standin = NULL;
+  }
+  self->panel = job->projector;
+  status = standin_create(self->boxes, &self->panel, &self->standin, error);
+  return status == CLT_OK ? clt_station_open_rig(&job->config, station, self->standin, error) : status;
+}
+
+static clt_status calibrate(measurer *self, const measure_job *job, measure_result *result) {
+  clt_status status = open_camera(self, job, &result->error);
+  if (status != CLT_OK) {
+    return status;
+  }
+  const clt_station *station = self->station;
+  snprintf(result->camera, sizeof result->camera, "%s", station->camera->driver->name);
   station->rig->operations->describe(station->rig, &result->rig);
   snprintf(result->response, sizeof result->response, "%s", result->rig.response);
   snprintf(result->source, sizeof result->source, "%s", result->rig.source);
@@ -85,22 +109,39 @@ static clt_status acquire(measurer *self, const measure_job *job, measure_result
   return clt_acquire(self->station->rig, &options, &result->transport, &result->error);
 }
 
+static clt_status measure_all(measurer *self, const measure_job *job, measure_result *result) {
+  clt_status status = acquire(self, job, result);
+  result->renewed.outcome = RENEW_MEASURE;
+  result->renewed.patterns += status == CLT_OK ? clt_transport_origin(result->transport)->patterns : 0;
+  return status;
+}
+
 /* Black and flood are photographed so often where the configuration leaves it open. */
 enum { RENEW_REPEATS = 4 };
 
 static clt_status renew(measurer *self, const measure_job *job, measure_result *result) {
   int repeats = job->config.acquire.repeats;
-  renew_options options = {.changed = job->kind == MEASURE_CHANGED,
+  renew_options options = {.changed = job->kind != MEASURE_PHOTOMETRY,
                            .repeats = repeats > 0 ? repeats : RENEW_REPEATS,
                            .progress = on_progress,
                            .context = self};
   self->reported_ns = 0;
   clt_status status =
       renew_transport(self->station->rig, job->model, &options, &result->transport, &result->renewed, &result->error);
-  if (status == CLT_OK && result->renewed.outcome == RENEW_MEASURE) {
-    status = acquire(self, job, result);
-    result->renewed.patterns += status == CLT_OK ? clt_transport_origin(result->transport)->patterns : 0;
+  return status == CLT_OK && result->renewed.outcome == RENEW_MEASURE ? measure_all(self, job, result) : status;
+}
+
+/* With the new map T may fit again; what else changed is looked for as for MEASURE_CHANGED. */
+static clt_status renew_geometry(measurer *self, const measure_job *job, measure_result *result) {
+  geometry_renewal found;
+  self->reported_ns = 0;
+  clt_status status = geometry_renew(job, self->station, self->standin, on_progress, self, &found, &result->error);
+  if (status == CLT_OK && job->model == NULL) {
+    status = measure_all(self, job, result);
+  } else if (status == CLT_OK && found.adopted) {
+    status = renew(self, job, result);
   }
+  result->renewed.geometry = found;
   return status;
 }
 
@@ -210,12 +251,22 @@ static clt_status work(measurer *self, measure_job *job, measure_result *result)
   case MEASURE_PHOTOMETRY:
   case MEASURE_CHANGED:
     return renew(self, job, result);
+  case MEASURE_GEOMETRY:
+    return renew_geometry(self, job, result);
   case MEASURE_VERIFY:
     return verify(self, job, result);
   case MEASURE_REFINE:
     return refine(self, job, result);
   default:
     return CLT_OK;
+  }
+}
+
+/* A camera that is gone, or gives no frames, is closed: `calibrate` opens it again. */
+static void give_up_camera(measurer *self, measure_result *result) {
+  result->closed = result->error.status == CLT_GONE || result->error.status == CLT_TIMEOUT;
+  if (result->closed) {
+    close_camera(self);
   }
 }
 
@@ -231,6 +282,7 @@ static void answer(measurer *self, measure_job *job) {
   if (observes(job->kind)) {
     standin_release(self->boxes);
   }
+  give_up_camera(self, result);
   daemon_report(self->boxes, self->boxes->measured, result);
 }
 
@@ -246,12 +298,6 @@ void *measure_run(void *boxes) {
     }
     measure_job_free(job);
   }
-  if (self.station != NULL && self.station->rig != NULL) {
-    self.station->rig->operations->close(self.station->rig);
-    self.station->rig = NULL;
-  }
-  if (self.standin != NULL) {
-    self.standin->driver->close(self.standin);
-  }
+  close_camera(&self);
   return NULL;
 }

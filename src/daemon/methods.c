@@ -5,8 +5,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/log.h"
 #include "daemon/control.h"
+#include "daemon/journal.h"
 
 typedef struct method {
   const char *name;
@@ -40,7 +40,7 @@ static measure_kind scope_kind(const char *scope) {
     measure_kind kind;
   } scopes[] = {{"transport", MEASURE_ACQUIRE},
                 {"photometry", MEASURE_PHOTOMETRY},
-                {"geometry", MEASURE_CALIBRATE},
+                {"geometry", MEASURE_GEOMETRY},
                 {"changed", MEASURE_CHANGED}};
   for (size_t i = 0; scope != NULL && i < sizeof scopes / sizeof scopes[0]; i++) {
     if (strcmp(scope, scopes[i].name) == 0) {
@@ -58,9 +58,10 @@ static void answer_reacquire(control *self, client *from, const rpc_request *req
                   "\"scope\" must be \"transport\", \"photometry\", \"geometry\" or \"changed\"");
     return;
   }
-  if (kind == MEASURE_CALIBRATE) {
+  if (kind == MEASURE_GEOMETRY && self->config.station.calibration[0] == '\0') {
     server_refuse(from, request, RPC_FAILED,
-                  "the daemon measures no geometry: run `counterlight calibrate`, then start the daemon again");
+                  "there is no geometry to measure again: without a \"calibration\" every cell is a whole number of "
+                  "the camera's pixels; for a camera that stands elsewhere run `counterlight calibrate` first");
     return;
   }
   control_wishes before = self->wishes;
@@ -105,12 +106,33 @@ static void wish_content(control *self, client *from, const rpc_request *request
   control_want(self, SOLVER_CONTENT);
 }
 
+/* A name goes into the log and into what systemd is told, line by line. */
+static bool is_one_line(const char *name) {
+  const unsigned char *at = (const unsigned char *)name;
+  while (*at >= ' ' && *at != 0x7f) {
+    at++;
+  }
+  return *at == '\0';
+}
+
+/* What is wrong with the params of `show`, or NULL. */
+static const char *fault_of_show(const char *path, int descriptor) {
+  if (path == NULL && descriptor < 0) {
+    return "needs {\"path\": \"/picture.png\"}, or the opened file passed along (SCM_RIGHTS)";
+  }
+  return path == NULL || is_one_line(path) ? NULL : "\"path\" must have no control characters";
+}
+
 static void answer_show(control *self, client *from, const rpc_request *request) {
-  char message[CLT_MESSAGE_MAX] = "needs {\"path\": \"/picture.png\"}, or the opened file passed along (SCM_RIGHTS)";
+  char message[CLT_MESSAGE_MAX];
   const char *path = json_string_value(json_object_get(request->params, "path"));
   int descriptor = client_take_passed(from);
-  if (descriptor < 0 && path == NULL) {
-    server_refuse(from, request, RPC_INVALID_PARAMS, message);
+  const char *fault = fault_of_show(path, descriptor);
+  if (fault != NULL) {
+    server_refuse(from, request, RPC_INVALID_PARAMS, fault);
+    if (descriptor >= 0) {
+      close(descriptor);
+    }
     return;
   }
   if (descriptor < 0) {
@@ -220,6 +242,18 @@ static const char *unknown_param(const method *asked, json_t *params) {
   return NULL;
 }
 
+/* Logs who asked for what. */
+static void note_request(const client *from, const char *name) {
+  char line[CLT_MESSAGE_MAX], pid[16], uid[16];
+  snprintf(line, sizeof line, "control socket: pid %ld uid %ld gid %ld asks to %s", (long)from->who.pid,
+           (long)from->who.uid, (long)from->who.gid, name);
+  snprintf(pid, sizeof pid, "%ld", (long)from->who.pid);
+  snprintf(uid, sizeof uid, "%ld", (long)from->who.uid);
+  const journal_field fields[] = {
+      {"COUNTERLIGHT_METHOD", name}, {"COUNTERLIGHT_CLIENT_PID", pid}, {"COUNTERLIGHT_CLIENT_UID", uid}};
+  journal_note(CLT_LOG_INFO, line, fields, sizeof fields / sizeof fields[0]);
+}
+
 void control_on_request(void *context, client *from, const rpc_request *request) {
   size_t i = 0;
   while (i < METHOD_COUNT && strcmp(methods[i].name, request->method) != 0) {
@@ -237,8 +271,7 @@ void control_on_request(void *context, client *from, const rpc_request *request)
     return;
   }
   if (methods[i].changes) {
-    clt_log(CLT_LOG_INFO, "control socket: pid %ld uid %ld gid %ld asks to %s", (long)from->who.pid,
-            (long)from->who.uid, (long)from->who.gid, request->method);
+    note_request(from, request->method);
   }
   methods[i].answer(context, from, request);
 }

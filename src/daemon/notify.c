@@ -1,5 +1,6 @@
 #include "daemon/notify.h"
 
+#include <inttypes.h>
 #include <systemd/sd-daemon.h>
 
 #include "base/clock.h"
@@ -36,9 +37,18 @@ void notify_stopping(void) {
   sd_notify(0, "STOPPING=1");
 }
 
-void notify_watchdog(notifier *self, uint64_t turns, bool excused) {
-  if (turns != self->fed_turns || excused) {
+void notify_turns(notifier *self, uint64_t turns) {
+  if (self->watchdog_usec > 0 && turns != self->fed_turns) {
     self->fed_turns = turns;
     sd_notify(0, "WATCHDOG=1");
   }
+}
+
+void notify_patience(notifier *self, bool patient) {
+  if (self->watchdog_usec == 0 || patient == self->patient) {
+    return;
+  }
+  self->patient = patient;
+  uint64_t usec = NOTIFY_PATIENCE_S * UINT64_C(1000000);
+  sd_notifyf(0, "WATCHDOG_USEC=%" PRIu64, patient && usec > self->watchdog_usec ? usec : self->watchdog_usec);
 }

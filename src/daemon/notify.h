@@ -5,10 +5,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+enum { NOTIFY_PATIENCE_S = 120 };
+
 typedef struct notifier {
   bool ready;             /* READY=1 was sent */
   uint64_t watchdog_usec; /* 0: systemd wants no watchdog */
   uint64_t fed_turns;     /* the output's turns when the watchdog was fed last */
+  bool patient;           /* the watchdog waits longer than the unit says */
 } notifier;
 
 void notify_init(notifier *self);
@@ -19,7 +22,10 @@ void notify_reloading(void);
 /* The end of a reload. */
 void notify_reloaded(const notifier *self);
 void notify_stopping(void);
-/* Feeds the watchdog where the output has turned since the last feeding, or is excused (devices being opened). */
-void notify_watchdog(notifier *self, uint64_t turns, bool excused);
+/* The output has reported: feeds the watchdog where it has turned since the last feeding. */
+void notify_turns(notifier *self, uint64_t turns);
+/* Makes the watchdog wait up to NOTIFY_PATIENCE_S for the output, which may be held up (devices being opened or
+ * closed), or again only as long as the unit says. */
+void notify_patience(notifier *self, bool patient);
 
 #endif

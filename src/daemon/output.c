@@ -13,12 +13,15 @@ static const double idle_refresh_s = 1.0 / 60, report_s = 0.25;
 struct output {
   const daemon_boxes *boxes;
   clt_station station;
-  bool open, stopping;
+  bool begun;          /* the station is */
+  bool open, stopping; /* the projector is open */
   clt_projector_info panel;
-  clt_panel known;     /* the panel's light, as far as it is known before the rig is */
-  output_drive *drive; /* the latest; survives a reopening */
-  float *codes;        /* of the drive on this panel */
-  bool measuring;      /* a pattern is on the glass and stays there */
+  clt_panel known;       /* the panel's light, as far as it is known before the rig is */
+  output_drive *drive;   /* the latest; survives a reopening */
+  float *codes;          /* of the drive on this panel */
+  output_moving *moving; /* the latest; NULL: nothing moves */
+  float *moving_codes;   /* of it on this panel, where the projector does not encode by itself */
+  bool measuring;        /* a pattern is on the glass and stays there */
   output_frames frames;
   int64_t reported_ns;
   output_frames reported;
@@ -35,17 +38,13 @@ clt_status output_create(const daemon_boxes *boxes, output **out, clt_error *err
   return CLT_OK;
 }
 
-static void close_station(output *main) {
-  clt_station_close(&main->station);
-  main->station = (clt_station){0};
-  main->open = main->measuring = false;
-}
-
 void output_destroy(output *main) {
   if (main != NULL) {
-    close_station(main);
+    clt_station_close(&main->station);
     output_drive_free(main->drive);
+    output_moving_free(main->moving);
     free(main->codes);
+    free(main->moving_codes);
     free(main);
   }
 }
@@ -80,23 +79,33 @@ static void report_opened(output *main, const clt_error *error) {
   if (main->open) {
     letter->projector = main->panel;
     snprintf(letter->projector_name, sizeof letter->projector_name, "%s", main->station.projector->driver->name);
-    snprintf(letter->camera_name, sizeof letter->camera_name, "%s", main->station.camera->driver->name);
     letter->panel = main->known;
   }
   daemon_report(main->boxes, main->boxes->opened, letter);
 }
 
-static void open_station(output *main, const clt_station_config *config) {
+static void open_projector(output *main, const clt_station_config *config) {
   clt_error error = {0};
-  if (!main->open && clt_station_open(config, &main->station, &error) == CLT_OK) {
+  main->begun = main->begun || clt_station_begin(config, &main->station, &error) == CLT_OK;
+  if (!main->open && main->begun && clt_station_open_projector(config, &main->station, &error) == CLT_OK) {
     main->open = true;
+    free(main->moving_codes);
+    main->moving_codes = NULL;
     main->station.projector->driver->describe(main->station.projector, &main->panel);
     main->known = clt_station_rig_config(config, &main->station).projector;
     encode_drive(main);
   }
-  if (error.status != CLT_OK) {
-    close_station(main);
-  }
+  report_opened(main, &error);
+}
+
+/* A projector that takes no picture any more is closed and reported, once. */
+static void lose_projector(output *main, const clt_error *cause) {
+  clt_error error = {0};
+  clt_fail(&error, CLT_GONE, "the projector takes no picture: %.400s", cause->message);
+  clt_station_close_projector(&main->station);
+  main->open = main->measuring = false;
+  free(main->codes);
+  main->codes = NULL;
   report_opened(main, &error);
 }
 
@@ -108,10 +117,7 @@ static void obey(output *main) {
   if (order->kind == OUTPUT_STOP) {
     main->stopping = true;
   } else {
-    if (order->kind == OUTPUT_REOPEN) {
-      close_station(main);
-    }
-    open_station(main, &order->station);
+    open_projector(main, &order->station);
   }
   free(order);
 }
@@ -125,43 +131,86 @@ static void take_drive(output *main) {
   }
 }
 
+static void take_moving(output *main) {
+  output_moving *newer = clt_mailbox_take(main->boxes->moving, 0);
+  if (newer != NULL && main->moving != NULL) {
+    clt_mailbox_put(main->boxes->spares, main->moving);
+  }
+  main->moving = newer != NULL ? newer : main->moving;
+}
+
+static bool is_moving(const output *main) {
+  return main->moving != NULL && (main->drive == NULL || main->moving->serial >= main->drive->serial);
+}
+
 static clt_status present(output *main, const float *codes, int64_t *shown_ns, clt_error *error) {
   clt_projector *projector = main->station.projector;
   if (!main->open) {
-    return clt_fail(error, CLT_GONE, "the projector is not open");
+    return clt_fail(error, CLT_FAILED, "the projector is not open");
   }
   clt_status status = projector->driver->present(projector, codes, shown_ns, error);
   main->frames.presented += status == CLT_OK;
   return status;
 }
 
-/* Shows a pattern at once and answers; or ends measuring, so that the drive is up again in this very turn. */
+/* Shows a pattern at once and answers; or ends measuring, so that the drive is up again in this very turn. To measure,
+ * CLT_GONE means its camera. */
 static void take_pattern(output *main, output_pattern *pattern) {
   output_answer *answer = pattern->codes != NULL ? clt_alloc(1, sizeof *answer) : NULL;
+  bool lost = false;
+  clt_error cause = {0};
   main->measuring = pattern->codes != NULL;
   if (answer != NULL) {
-    answer->error.status = present(main, pattern->codes, &answer->shown_ns, &answer->error);
+    if (present(main, pattern->codes, &answer->shown_ns, &answer->error) != CLT_OK) {
+      answer->error.status = CLT_FAILED;
+      lost = main->open;
+      cause = answer->error;
+    }
     clt_mailbox_put(main->boxes->answers, answer);
   }
   output_pattern_free(pattern);
+  if (lost) {
+    lose_projector(main, &cause);
+  }
 }
 
-/* A projector that takes no picture any more is reported once: it counts as closed from then on. */
-static void show_drive(output *main) {
+/* By the projector itself, else encoded and dithered here. Every refresh has a dither of its own. */
+static clt_status present_moving(output *main, int64_t *shown_ns, clt_error *error) {
+  clt_projector *projector = main->station.projector;
+  clt_live_picture *picture = &main->moving->picture;
+  const clt_projector_info *panel = &main->panel;
+  size_t count = (size_t)panel->channels * (size_t)panel->height * (size_t)panel->width;
+  picture->seed = (uint32_t)main->frames.presented;
+  if (projector->driver->present_live != NULL) {
+    clt_status status = projector->driver->present_live(projector, picture, shown_ns, error);
+    main->frames.presented += status == CLT_OK;
+    return status;
+  }
+  main->moving_codes = main->moving_codes != NULL ? main->moving_codes : clt_alloc(count, sizeof(float));
+  if (main->moving_codes == NULL) {
+    return clt_fail(error, CLT_FAILED, "no memory for a picture of %d x %d", panel->width, panel->height);
+  }
+  clt_status status = clt_live_encode(picture, panel->channels, panel->height, panel->width, main->moving_codes, error);
+  if (status != CLT_OK) {
+    return status;
+  }
+  clt_live_dither(main->moving_codes, count, panel->bits, picture->seed);
+  return present(main, main->moving_codes, shown_ns, error);
+}
+
+static void show_picture(output *main) {
   int64_t shown_ns;
   clt_error error = {0};
-  if (main->codes == NULL || main->measuring || !main->open) {
+  bool moves = is_moving(main);
+  if (main->measuring || !main->open || (main->codes == NULL && !moves)) {
     return;
   }
-  if (present(main, main->codes, &shown_ns, &error) == CLT_OK) {
+  clt_status status = moves ? present_moving(main, &shown_ns, &error) : present(main, main->codes, &shown_ns, &error);
+  if (status == CLT_OK) {
     main->frames.picture = true;
-    return;
+  } else {
+    lose_projector(main, &error);
   }
-  clt_log(CLT_LOG_ERROR, "the projector takes no picture: %s", error.message);
-  error.status = CLT_GONE;
-  free(main->codes);
-  main->codes = NULL;
-  report_opened(main, &error);
 }
 
 /* Reports now and then, and at once when the first picture is up. */
@@ -184,7 +233,8 @@ static void turn(output *main) {
   int64_t start_ns = clt_clock_ns();
   obey(main);
   take_drive(main);
-  show_drive(main);
+  take_moving(main);
+  show_picture(main);
   main->frames.turns++;
   report_frames(main);
   double left = refresh_s - clt_clock_since(start_ns);

@@ -7,8 +7,8 @@
 typedef struct output output;
 
 clt_status output_create(const daemon_boxes *boxes, output **out, clt_error *error);
-/* Opens devices and presents until the order to stop comes: the pending pattern where there is one, else the latest
- * drive. Every turn lasts one refresh, or less where a pattern comes. */
+/* Opens the projector and presents until the order to stop comes: the pending pattern where there is one, else the
+ * latest drive. Every turn lasts one refresh, or less where a pattern comes. */
 void output_run(output *main);
 void output_destroy(output *main); /* closes the station: after measure has ended; accepts NULL */
 

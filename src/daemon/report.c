@@ -1,8 +1,10 @@
 /* What clients are told. */
+#include <math.h>
 #include <stdio.h>
 
 #include "base/file.h"
 #include "daemon/control.h"
+#include "daemon/journal.h"
 
 /* A time as 2026-01-31T12:00:00Z. */
 static json_t *iso_time(time_t when) {
@@ -80,19 +82,51 @@ json_t *control_drift_note(const control *self) {
                    self->found.drifts);
 }
 
+static json_t *geometry_note(const geometry_renewal *geometry) {
+  if (!geometry->measured) {
+    return json_null();
+  }
+  return json_pack("{s:b, s:o, s:o, s:o}", "adopted", geometry->adopted, "covered",
+                   geometry->adopted ? json_real(geometry->covered) : json_null(), "moved",
+                   geometry->adopted && isfinite(geometry->moved) ? json_real(geometry->moved) : json_null(), "why",
+                   text_or_null(geometry->why));
+}
+
 json_t *control_renewed_note(const control *self) {
-  static const char *const names[] = {[RENEW_NONE] = "",
+  static const char *const names[] = {[RENEW_NONE] = "kept",
                                       [RENEW_FITS] = "nothing",
                                       [RENEW_GAIN] = "gain",
                                       [RENEW_REPAINT] = "repaint",
                                       [RENEW_MEASURE] = "transport"};
   const renewal *renewed = &self->found.renewed;
-  if (renewed->outcome == RENEW_NONE) {
+  if (renewed->outcome == RENEW_NONE && !renewed->geometry.measured) {
     return json_null();
   }
-  return json_pack("{s:s, s:i, s:I, s:f, s:f, s:f, s:b}", "done", names[renewed->outcome], "patterns",
+  return json_pack("{s:s, s:i, s:I, s:f, s:f, s:f, s:b, s:o}", "done", names[renewed->outcome], "patterns",
                    renewed->patterns, "rows", (json_int_t)renewed->rows, "off_before", renewed->before.off, "off_after",
-                   renewed->after.off, "limit", renewed->after.limit, "fits", renewed->after.fits);
+                   renewed->after.off, "limit", renewed->after.limit, "fits", renewed->after.fits, "geometry",
+                   geometry_note(&renewed->geometry));
+}
+
+json_t *control_moving_note(const control *self) {
+  const moving_report *moved = &self->found.moved;
+  const clt_frames_result *last = &moved->last;
+  if (moved->serial != self->found.content_serial || self->work.playing.path[0] == '\0') {
+    return json_null();
+  }
+  json_t *note = json_pack("{s:I, s:I, s:I, s:f, s:b, s:f}", "frames", (json_int_t)moved->frames, "late",
+                           (json_int_t)moved->late, "skipped", (json_int_t)moved->skipped, "fps", moved->fps,
+                           "compensated", moved->compensated, "ms", moved->ms);
+  if (moved->compensated) {
+    json_object_set_new(note, "error", json_real(last->live.error));
+    json_object_set_new(note, "scale", json_real(last->scale));
+    json_object_set_new(note, "offset", json_real(last->offset));
+    json_object_set_new(note, "stages",
+                        json_pack("{s:f, s:f, s:f, s:f}", "mean_ms", last->ms[CLT_FRAMES_MEAN], "map_ms",
+                                  last->ms[CLT_FRAMES_MAP], "solve_ms", last->ms[CLT_FRAMES_SOLVE], "fields_ms",
+                                  last->ms[CLT_FRAMES_FIELDS]));
+  }
+  return note;
 }
 
 static json_t *frame_note(const control_findings *found) {
@@ -131,8 +165,8 @@ static json_t *devices_note(const control_findings *found) {
     return json_null();
   }
   const clt_projector_info *panel = &found->devices.projector;
-  return json_pack("{s:s, s:s, s:o, s:[i, i], s:f}", "projector", found->devices.projector_name, "camera",
-                   found->devices.camera_name, "source", text_or_null(found->source), "panel", panel->width,
+  return json_pack("{s:s, s:o, s:o, s:[i, i], s:f}", "projector", found->devices.projector_name, "camera",
+                   text_or_null(found->camera), "source", text_or_null(found->source), "panel", panel->width,
                    panel->height, "refresh_hz", panel->refresh_s > 0 ? 1 / panel->refresh_s : 0.0);
 }
 
@@ -143,7 +177,9 @@ json_t *control_status(const control *self) {
   json_object_set_new(status, "version", json_string(CLT_VERSION));
   json_object_set_new(status, "content", text_or_null(self->found.content));
   json_object_set_new(status, "transport", transport_note(&self->found.transport));
-  json_object_set_new(status, "frame", frame_note(&self->found));
+  json_t *frame = frame_note(&self->found);
+  json_object_set_new(frame, "moving", control_moving_note(self));
+  json_object_set_new(status, "frame", frame);
   json_object_set_new(status, "verify", control_verify_note(self));
   json_object_set_new(status, "reacquired", control_renewed_note(self));
   json_object_set_new(status, "drift", control_drift_note(self));
@@ -177,4 +213,16 @@ void control_status_line(const control *self, char *line, size_t size) {
   } else {
     snprintf(line, size, "%s", name);
   }
+}
+
+void control_note(const control *self, clt_log_level level, const char *line) {
+  const control_findings *found = &self->found;
+  const journal_field fields[] = {
+      {"COUNTERLIGHT_STATE", machine_state_name(self->state)},
+      {"COUNTERLIGHT_WHY", self->why},
+      {"COUNTERLIGHT_CONTENT", found->content},
+      {"COUNTERLIGHT_PROJECTOR", found->open ? found->devices.projector_name : ""},
+      {"COUNTERLIGHT_CAMERA", found->camera},
+  };
+  journal_note(level, line, fields, sizeof fields / sizeof fields[0]);
 }

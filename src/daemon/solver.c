@@ -132,13 +132,12 @@ static void use_model(solver *self, daemon_model *model) {
 
 /* The transport in hand where it still fits the rig, else a stored one. */
 static clt_status load(solver *self, solver_job *job, solver_result *result) {
-  if (self->model != NULL) {
-    clt_transport_info info = clt_transport_describe(self->model->transport);
-    if (info.width == job->width && info.height == job->height && info.channels == job->channels) {
-      return CLT_OK;
-    }
-    use_model(self, NULL);
+  char why[CLT_MESSAGE_MAX];
+  if (self->model != NULL &&
+      !store_is_foreign(self->model->transport, job->width, job->height, job->channels, job->source, why, sizeof why)) {
+    return CLT_OK;
   }
+  use_model(self, NULL);
   clt_transport *stored = store_load_transport(self->state, job->width, job->height, job->channels, job->source);
   daemon_model *model = NULL;
   if (stored == NULL) {

@@ -36,13 +36,17 @@ static void sweep(const store *state) {
   }
 }
 
-static clt_status take_lock(store *out, clt_error *error) {
+/* The problem: why there is no lock, which is no failure. */
+static clt_status take_lock(store *out, clt_error *problem, clt_error *error) {
   char path[CLT_PATH_MAX];
   clt_status status = store_path(out, ".lock", path, error);
   if (status != CLT_OK) {
     return status;
   }
   out->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0640);
+  if (out->lock < 0) {
+    clt_fail(problem, CLT_FAILED, "%s: %s", path, strerror(errno));
+  }
   if (out->lock >= 0 && flock(out->lock, LOCK_EX | LOCK_NB) != 0) {
     store_close(out);
     return clt_fail(error, CLT_FAILED,
@@ -60,7 +64,7 @@ clt_status store_open(const char *folder, store *out, clt_error *error) {
   clt_error problem = {0};
   clt_status status = CLT_OK;
   if (clt_place_make_folder(folder, 0750, &problem) == CLT_OK) {
-    status = take_lock(out, error);
+    status = take_lock(out, &problem, error);
   }
   if (status == CLT_OK && !out->writable) {
     clt_log(CLT_LOG_WARNING, "%s: the state directory cannot be written to: nothing will survive a restart%s%s", folder,
@@ -131,12 +135,12 @@ static void set_aside(const char *path, const char *suffix) {
   }
 }
 
-/* Says why a transport does not serve this rig, or gives false. */
-static bool is_foreign(const clt_transport *transport, int width, int height, int channels, const char *source,
-                       char *why, size_t size) {
+bool store_is_foreign(const clt_transport *transport, int width, int height, int channels, const char *source,
+                      char *why, size_t size) {
   clt_transport_info info = clt_transport_describe(transport);
   const char *origin = clt_transport_origin(transport)->source;
-  if (info.width != width || info.height != height || info.channels != channels || info.rows != info.cols) {
+  bool other = width > 0 && (info.width != width || info.height != height || info.channels != channels);
+  if (other || info.rows != info.cols) {
     snprintf(why, size, "its grid is %d x %d x %d, the rig's is %d x %d x %d", info.width, info.height, info.channels,
              width, height, channels);
     return true;
@@ -166,7 +170,7 @@ clt_transport *store_load_transport(const store *state, int width, int height, i
     set_aside(path, suffix);
     return NULL;
   }
-  if (is_foreign(transport, width, height, channels, source, why, sizeof why)) {
+  if (store_is_foreign(transport, width, height, channels, source, why, sizeof why)) {
     clt_log(CLT_LOG_WARNING, "the stored transport %s is of another rig and not used: %s", path, why);
     clt_transport_destroy(transport);
     set_aside(path, "old");

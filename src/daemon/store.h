@@ -1,5 +1,6 @@
 /* The state directory: what survives the end of the daemon.
  *
+ *   calibration.h5 a geometry that was measured again (geometry.c)
  *   transport.h5   the transport in use, replaced only by a complete newer one
  *   content.EXT    the picture that `show` brought, as it came
  *   drive.npy      the last drive
@@ -41,6 +42,9 @@ clt_status store_path(const store *state, const char *name, char *out, clt_error
 void store_read_record(const store *state, store_record *record);
 clt_status store_write_record(const store *state, const store_record *record, clt_error *error);
 
+/* Says why a transport does not serve this rig, or gives false. A width of 0 and an empty source are not known yet. */
+bool store_is_foreign(const clt_transport *transport, int width, int height, int channels, const char *source,
+                      char *why, size_t size);
 /* The stored transport where it has the grid and was measured on the source (where both are known), else NULL, and the
  * log says why. A file that cannot be read is moved aside as transport.h5.bad-TIME, one of another rig as
  * transport.h5.old. */

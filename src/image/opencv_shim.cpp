@@ -12,6 +12,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "image/opencv_guard.hpp"
+
 namespace {
 
 /* Debian's OpenCV has its EXR codec switched off until this variable is set. It is set while the program is loaded,
@@ -45,20 +47,12 @@ private:
   std::streambuf *buffer_;
 };
 
-/* Runs work with every exception caught. */
+/* Runs work in silence, with every exception caught. */
 template <typename Work> clt_status guarded(const char *path, const char *what, clt_error *error, Work work) {
-  try {
+  return clt_guarded(path, what, error, [&] {
     Silence silence;
     return work();
-  } catch (const std::bad_alloc &) {
-    return clt_fail(error, CLT_FAILED, "%s: %s: memory is short", path, what);
-  } catch (const cv::Exception &exception) {
-    return clt_fail(error, CLT_BAD_INPUT, "%s: %s: %s", path, what, exception.err.c_str());
-  } catch (const std::exception &exception) {
-    return clt_fail(error, CLT_BAD_INPUT, "%s: %s: %s", path, what, exception.what());
-  } catch (...) {
-    return clt_fail(error, CLT_FAILED, "%s: %s for an unknown reason", path, what);
-  }
+  });
 }
 
 /* A matrix on the raster's own samples. */

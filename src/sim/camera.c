@@ -21,7 +21,9 @@ typedef struct simulated_camera {
   clt_exposure exposure; /* its channels stand there once for each layer */
   clt_signal signal;     /* its radiance is the exposure's where nothing tells the pixels of a cell apart */
   uint16_t *samples;
-  bool delivered; /* samples hold a frame */
+  bool delivered;  /* samples hold a frame */
+  bool gone;       /* it was unplugged since it was opened */
+  int64_t seen_ns; /* until when that is known */
 } simulated_camera;
 
 static void describe(const clt_camera *camera, clt_camera_info *info) {
@@ -155,10 +157,21 @@ static int64_t collect_light(simulated_camera *self, const clt_shutter *taken) {
   return self->band[self->bands - 1].end_ns;
 }
 
+/* A camera that was unplugged has to be opened again, also where it is back. Under the scene's lock. */
+static clt_status stay_plugged(simulated_camera *self, int64_t until_ns, clt_error *error) {
+  self->gone = self->gone || clt_plan_away(&self->scene->plan, self->seen_ns, until_ns);
+  self->seen_ns = until_ns > self->seen_ns ? until_ns : self->seen_ns;
+  return self->gone ? clt_fail(error, CLT_GONE, "the simulated camera was unplugged") : CLT_OK;
+}
+
 /* Takes the next wanted frame off the clock into `taken` and collects its light; under the scene's lock. */
 static clt_status expose(simulated_camera *self, int64_t not_before_ns, double timeout_s, clt_shutter *taken,
                          clt_fate *fate, clt_error *error) {
   clt_scene *scene = self->scene;
+  clt_status status = stay_plugged(self, scene->now_ns, error);
+  if (status != CLT_OK) {
+    return status;
+  }
   *taken = self->shutter;
   double wait_s = ((double)not_before_ns - (double)scene->now_ns) * 1e-9;
   if (wait_s <= timeout_s) {
@@ -174,6 +187,11 @@ static clt_status expose(simulated_camera *self, int64_t not_before_ns, double t
                     wait_s, timeout_s);
   }
   int64_t end_ns = collect_light(self, taken) + fate->late_ns;
+  status = stay_plugged(self, end_ns, error);
+  if (status != CLT_OK) {
+    scene->now_ns = taken->start_ns > scene->now_ns ? taken->start_ns : scene->now_ns;
+    return status;
+  }
   self->shutter = *taken;
   clt_shutter_step(&self->shutter);
   scene->now_ns = end_ns > scene->now_ns ? end_ns : scene->now_ns;
@@ -291,13 +309,14 @@ clt_status clt_scene_open_camera(clt_scene *scene, clt_camera **out, clt_error *
     return clt_fail(error, CLT_FAILED, "out of memory for the simulated camera's frames");
   }
   pthread_mutex_lock(&scene->lock);
-  bool taken = scene->camera_open;
-  scene->camera_open = true;
-  self->shutter.start_ns = scene->now_ns;
+  bool taken = scene->camera_open, away = clt_plan_away(&scene->plan, scene->now_ns, scene->now_ns);
+  scene->camera_open = taken || !away;
+  self->shutter.start_ns = self->seen_ns = scene->now_ns;
   pthread_mutex_unlock(&scene->lock);
-  if (taken) {
+  if (taken || away) {
     destroy(self);
-    return clt_fail(error, CLT_BAD_INPUT, "the scene's camera is already open; close it first");
+    return taken ? clt_fail(error, CLT_BAD_INPUT, "the scene's camera is already open; close it first")
+                 : clt_fail(error, CLT_GONE, "the simulated camera is unplugged");
   }
   *out = &self->base;
   return CLT_OK;

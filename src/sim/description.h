@@ -58,6 +58,7 @@ typedef struct clt_drift_description {
 typedef struct clt_faults_description {
   double dropped, stuck, late, torn; /* probabilities, of a frame */
   double late_s;
+  double gone_at_s, gone_s, gone_every_s; /* the camera is unplugged for gone_s (0: never), again every gone_every_s */
 } clt_faults_description;
 
 typedef struct clt_subsurface_description {

@@ -8,7 +8,7 @@
 typedef struct simulated_projector {
   clt_projector base;
   clt_scene *scene;
-  float *drive; /* channels * cells values of work space */
+  float *drive, *codes; /* channels * cells values of work space each */
 } simulated_projector;
 
 static void describe(const clt_projector *projector, clt_projector_info *info) {
@@ -65,8 +65,22 @@ static clt_status present(clt_projector *projector, const float *codes, int64_t 
   return status;
 }
 
+static clt_status present_live(clt_projector *projector, const clt_live_picture *picture, int64_t *shown_ns,
+                               clt_error *error) {
+  simulated_projector *self = (simulated_projector *)projector;
+  const clt_scene_description *description = &self->scene->description;
+  clt_status status = clt_live_encode(picture, description->channels, description->height, description->width,
+                                      self->codes, error);
+  if (status != CLT_OK) {
+    return status;
+  }
+  clt_live_dither(self->codes, self->scene->timeline.values, description->projector.bits, picture->seed);
+  return present(projector, self->codes, shown_ns, error);
+}
+
 static void destroy(simulated_projector *self) {
   free(self->drive);
+  free(self->codes);
   free(self);
 }
 
@@ -81,7 +95,12 @@ static void close_projector(clt_projector *projector) {
 }
 
 static const clt_projector_driver driver = {
-    .name = "simulated", .describe = describe, .present = present, .close = close_projector};
+    .name = "simulated",
+    .describe = describe,
+    .present = present,
+    .close = close_projector,
+    .present_live = present_live,
+};
 
 static simulated_projector *create(clt_scene *scene) {
   simulated_projector *self = clt_alloc(1, sizeof *self);
@@ -91,7 +110,8 @@ static simulated_projector *create(clt_scene *scene) {
   self->base.driver = &driver;
   self->scene = scene;
   self->drive = clt_alloc(scene->timeline.values, sizeof(float));
-  if (self->drive == NULL) {
+  self->codes = clt_alloc(scene->timeline.values, sizeof(float));
+  if (self->drive == NULL || self->codes == NULL) {
     destroy(self);
     return NULL;
   }

@@ -29,17 +29,19 @@ static inline double clt_box_project(const clt_box *box, size_t j, double value)
   return value < 0 ? 0 : value > top ? top : value;
 }
 
-enum { CLT_SECANTS = 20, CLT_SECANT_VECTORS = 2 * CLT_SECANTS + 3, CLT_SECANT_CELLS = 64 };
+enum { CLT_SECANTS = 20, CLT_SECANT_VECTORS = 2 * CLT_SECANTS + 4, CLT_SECANT_CELLS = 64 };
 
 /* What the steps so far have shown of H = S' S: B = sigma (I - V (V'V)^-1 V') + Y Y' with Y = H V and V' Y = I, the
  * positive definite matrix that agrees with H on all of V (block BFGS; Schnabel 1983). */
 typedef struct clt_secants {
   const clt_box *box;
   int count;
-  double sigma;                            /* the curvature that is taken for granted elsewhere */
-  double *v[CLT_SECANTS], *y[CLT_SECANTS]; /* cols values each, the oldest first */
-  double *slope, *rest, *open;             /* cols values: g + B d, a right side, and 1 where a cell is free */
-  double gram[CLT_SECANTS][CLT_SECANTS];   /* V' V */
+  double sigma;                                /* the curvature that is taken for granted elsewhere */
+  double *v[CLT_SECANTS], *y[CLT_SECANTS];     /* cols values each, the oldest first */
+  double *slope, *rest, *open;                 /* cols values: g + B d, a right side, and 1 where a cell is free */
+  double *counted;                             /* cols values: 1 where a cell is in `whole` */
+  double gram[CLT_SECANTS][CLT_SECANTS];       /* V' V */
+  double whole[4 * CLT_SECANTS * CLT_SECANTS]; /* U'U over the counted cells, U = [V Y]; column-major, upper triangle */
   double small[4 * CLT_SECANTS * CLT_SECANTS], packed[2 * CLT_SECANTS * CLT_SECANT_CELLS];
 } clt_secants;
 

@@ -14,9 +14,10 @@ void clt_secants_open(clt_secants *model, const clt_box *box, size_t first) {
   model->slope = clt_system_vector(box->system, first);
   model->rest = clt_system_vector(box->system, first + 1);
   model->open = clt_system_vector(box->system, first + 2);
+  model->counted = clt_system_vector(box->system, first + 3);
   for (size_t k = 0; k < CLT_SECANTS; k++) {
-    model->v[k] = clt_system_vector(box->system, first + 3 + k);
-    model->y[k] = clt_system_vector(box->system, first + 3 + CLT_SECANTS + k);
+    model->v[k] = clt_system_vector(box->system, first + 4 + k);
+    model->y[k] = clt_system_vector(box->system, first + 4 + CLT_SECANTS + k);
   }
 }
 
@@ -95,25 +96,38 @@ static bool model_slope(const clt_secants *model, const double *d, double *out) 
   return true;
 }
 
-/* small = U'U over the free cells, U = [V Y], column-major; upper triangle. */
-static void free_products(clt_secants *model) {
+/* Takes cells into `whole` or out of it: those that are free and not counted, or counted and not free. */
+static void recount(clt_secants *model, bool in) {
   size_t cols = model->box->system->cols, j = 0;
+  const double before = in ? 0 : 1, now = in ? 1 : 0;
   int order = 2 * model->count;
-  memset(model->small, 0, sizeof model->small);
-  while (order > 0 && j < cols) {
+  while (j < cols) {
     int cells = 0;
     for (; j < cols && cells < CLT_SECANT_CELLS; j++) {
-      if (model->open[j] == 0) {
+      if (model->counted[j] != before || model->open[j] != now) {
         continue;
       }
+      model->counted[j] = now;
       double *packed = model->packed + cells++ * order;
       for (int k = 0; k < model->count; k++) {
         packed[k] = model->v[k][j];
         packed[model->count + k] = model->y[k][j];
       }
     }
-    cblas_dsyrk(CblasColMajor, CblasUpper, CblasNoTrans, order, cells, 1, model->packed, order, 1, model->small, order);
+    if (cells > 0) {
+      cblas_dsyrk(CblasColMajor, CblasUpper, CblasNoTrans, order, cells, in ? 1 : -1, model->packed, order, 1,
+                  model->whole, order);
+    }
   }
+}
+
+/* U'U over the free cells, from what it was for the last set; the vectors stay the same. */
+static void free_products(clt_secants *model) {
+  if (model->count > 0) {
+    recount(model, false);
+    recount(model, true);
+  }
+  memcpy(model->small, model->whole, sizeof model->small);
 }
 
 /* rest = B_ff^-1 rest on the free cells, where rest is 0 on the others. By Woodbury's identity, with U = [V Y] there,
@@ -167,6 +181,8 @@ bool clt_secants_minimise(clt_secants *model) {
   size_t cols = box->system->cols;
   double *d = box->direction;
   memset(d, 0, cols * sizeof *d);
+  memset(model->counted, 0, cols * sizeof *model->counted);
+  memset(model->whole, 0, sizeof model->whole);
   clt_copy(cols, box->gradient, model->slope);
   for (int change = 0; change < SET_CHANGES; change++) {
     size_t changed = choose_set(model, d);

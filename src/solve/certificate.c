@@ -15,6 +15,7 @@ struct clt_certificate {
   size_t rows, cols;
   clt_channel_certificate channel[CLT_CHANNELS_MAX];
   double *first_bounce, *flux; /* channels x cols */
+  double *flood;               /* channels x rows: T 1 over lit cells */
   unsigned char *lit;
   clt_model model[CLT_CHANNELS_MAX];
 };
@@ -197,16 +198,16 @@ static double bound_norm(clt_system *system) {
   return sqrt(most_row * most_column);
 }
 
-/* Products with the cells that take part must be numbers: a NaN in a dark row or column does no harm, one among the lit
- * entries spoils every answer. */
-static clt_status check_finite(clt_system *system, int c, clt_error *error) {
-  double *ones = clt_system_vector(system, 0), *sums = clt_system_vector(system, 1);
+/* flood = T 1 over lit cells. Products with the cells that take part must be numbers: a NaN in a dark row or column
+ * does no harm, one among the lit entries spoils every answer. */
+static clt_status check_finite(clt_system *system, int c, double *flood, clt_error *error) {
+  double *ones = clt_system_vector(system, 0);
   for (size_t i = 0; i < system->cols; i++) {
     ones[i] = system->lit[i] ? system->first_bounce[i] : 0;
   }
-  clt_system_apply(system, ones, sums);
+  clt_system_apply(system, ones, flood);
   for (size_t i = 0; i < system->rows; i++) {
-    if (!isfinite(sums[i])) {
+    if (!isfinite(flood[i])) {
       return clt_fail(error, CLT_BAD_INPUT,
                       "row %zu of channel %d of the transport holds a value that is not a finite number; measure it "
                       "again, or set the row and its cell's column to 0",
@@ -252,7 +253,7 @@ static clt_status certify_channel(clt_certificate *certificate, clt_system *syst
   channel->white = quantile(first_bounce, lit, system->cols, 0.5, system->drive);
   clt_system_select(system, c, first_bounce, lit);
   clt_status status = check_matched(system, c, channel, first_bounce, error);
-  status = status == CLT_OK ? check_finite(system, c, error) : status;
+  status = status == CLT_OK ? check_finite(system, c, certificate->flood + (size_t)c * system->rows, error) : status;
   if (status != CLT_OK) {
     return status;
   }
@@ -281,9 +282,11 @@ clt_status clt_certify(const clt_transport *transport, clt_certificate **out, cl
   *certificate = (clt_certificate){.channels = info.channels, .rows = info.rows, .cols = info.cols};
   certificate->first_bounce = clt_alloc(values, sizeof(double));
   certificate->flux = clt_alloc(values, sizeof(double));
+  certificate->flood = clt_alloc((size_t)info.channels * info.rows, sizeof(double));
   certificate->lit = clt_alloc(values, 1);
   clt_status status = CLT_OK;
-  if (certificate->first_bounce == NULL || certificate->flux == NULL || certificate->lit == NULL) {
+  if (certificate->first_bounce == NULL || certificate->flux == NULL || certificate->flood == NULL ||
+      certificate->lit == NULL) {
     status = clt_fail(error, CLT_FAILED, "not enough memory for a certificate of %zu cells", info.cols);
   }
   if (status == CLT_OK) {
@@ -329,6 +332,7 @@ void clt_certificate_destroy(clt_certificate *certificate) {
   }
   free(certificate->first_bounce);
   free(certificate->flux);
+  free(certificate->flood);
   free(certificate->lit);
   free(certificate);
 }
@@ -343,6 +347,10 @@ const unsigned char *clt_certificate_lit(const clt_certificate *certificate, int
 
 const double *clt_certificate_first_bounce(const clt_certificate *certificate, int channel) {
   return certificate->first_bounce + (size_t)channel * certificate->cols;
+}
+
+const double *clt_certificate_flood(const clt_certificate *certificate, int channel) {
+  return certificate->flood + (size_t)channel * certificate->rows;
 }
 
 const double *clt_certificate_flux(const clt_certificate *certificate, int channel) {

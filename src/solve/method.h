@@ -36,6 +36,7 @@ typedef struct clt_run {
   int iterations;              /* done so far */
   size_t curve_count;          /* of the method that runs now */
   double curve[CLT_CURVE_MAX]; /* ||b - S l|| after each iteration */
+  double norm;                 /* the latest of it */
   char note[CLT_NOTE_MAX];     /* why the method broke */
 } clt_run;
 
@@ -107,6 +108,8 @@ double clt_flux_weights(clt_system *system, double *w);
 
 /* The worst figures of any channel: the method must serve all of them. */
 clt_channel_certificate clt_certificate_worst(const clt_certificate *certificate);
+/* T 1 over the lit cells of a channel, rows values. */
+const double *clt_certificate_flood(const clt_certificate *certificate, int channel);
 /* The small copy of S of a channel. */
 const clt_model *clt_certificate_model(const clt_certificate *certificate, int channel);
 /* True where the certificate was made for a transport of this shape. */

@@ -6,6 +6,7 @@
 #include "solve/method.h"
 
 static void append(clt_run *run, double norm) {
+  run->norm = norm;
   if (run->curve_count < CLT_CURVE_MAX) {
     run->curve[run->curve_count++] = norm;
   }

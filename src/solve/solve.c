@@ -46,6 +46,7 @@ static void select_system(clt_solver *solver, int k) {
   clt_system_select(system, k, clt_certificate_first_bounce(solver->certificate, k),
                     clt_certificate_lit(solver->certificate, k));
   system->flux = clt_certificate_flux(solver->certificate, k);
+  system->flood = clt_certificate_flood(solver->certificate, k);
   system->reciprocity = solver->systems > 1 ? clt_certificate_channel(solver->certificate, k)->reciprocity
                                             : clt_certificate_worst(solver->certificate).reciprocity;
 }
@@ -234,6 +235,12 @@ static void take_start(const clt_job *job, int k) {
   }
 }
 
+/* True where what the method says of its residual is taken for it: the bounded ones say something else. */
+static bool is_trusted(const clt_job *job, clt_outcome outcome, bool bounded) {
+  const clt_solver *solver = job->solver;
+  return solver->options.trust && outcome == CLT_RUN_CONVERGED && !solver->method->bounded && !bounded;
+}
+
 static clt_status solve_system(clt_job *job, int k, const double *wanted, double *drive, bool *converged,
                                clt_error *error) {
   clt_solver *solver = job->solver;
@@ -242,6 +249,7 @@ static clt_status solve_system(clt_job *job, int k, const double *wanted, double
   clt_status status = CLT_OK;
   clt_outcome outcome = CLT_RUN_CONVERGED;
   long products = system->products;
+  size_t outside = job->outside;
   select_system(solver, k);
   clt_system_want(system, wanted + (size_t)k * system->rows);
   take_start(job, k);
@@ -265,7 +273,9 @@ static clt_status solve_system(clt_job *job, int k, const double *wanted, double
   job->wanted_norm[k] = system->wanted_norm;
   job->products[k] = system->products - products;
   write_drive(solver, drive + (size_t)k * system->cols);
-  job->residual[k] = drive_residual(system, drive + (size_t)k * system->cols);
+  job->residual[k] = is_trusted(job, outcome, job->outside > outside || job->stalled)
+                         ? run->norm
+                         : drive_residual(system, drive + (size_t)k * system->cols);
   *converged = outcome == CLT_RUN_CONVERGED;
   return status;
 }

@@ -184,6 +184,9 @@ class Exhibit:
         with self.client() as client:
             return client.ask("status")
 
+    def process_folder(self):
+        return pathlib.Path(f"/proc/{self.process.pid}")
+
     def wait_state(self, *states):
         """The first status that says one of the states."""
         with self.client() as client:

@@ -64,20 +64,42 @@ static void a_stuck_output_starves_the_watchdog(void **state) {
   setenv("WATCHDOG_USEC", "123456", 1);
   notify_init(&self);
   assert_int_equal(self.watchdog_usec, 123456);
-  notify_watchdog(&self, 5, false);
+  notify_turns(&self, 5);
   assert_string_equal(hear(), "WATCHDOG=1");
-  notify_watchdog(&self, 5, false);
+  notify_turns(&self, 5);
   assert_string_equal(hear(), "");
-  notify_watchdog(&self, 5, true);
+  notify_turns(&self, 6);
   assert_string_equal(hear(), "WATCHDOG=1");
-  notify_watchdog(&self, 6, false);
-  assert_string_equal(hear(), "WATCHDOG=1");
+}
+
+/* While devices are opened the watchdog waits longer, but not for ever; a unit that is more patient still is obeyed. */
+static void patience_is_granted_and_taken_back(void **state) {
+  (void)state;
+  notifier self;
+  setenv("WATCHDOG_USEC", "1500000", 1);
+  notify_init(&self);
+  notify_patience(&self, true);
+  assert_string_equal(hear(), "WATCHDOG_USEC=120000000");
+  notify_patience(&self, true);
+  assert_string_equal(hear(), "");
+  notify_patience(&self, false);
+  assert_string_equal(hear(), "WATCHDOG_USEC=1500000");
+  setenv("WATCHDOG_USEC", "600000000", 1);
+  notify_init(&self);
+  notify_patience(&self, true);
+  assert_string_equal(hear(), "WATCHDOG_USEC=600000000");
+  unsetenv("WATCHDOG_USEC");
+  notify_init(&self);
+  notify_patience(&self, true);
+  notify_turns(&self, 5);
+  assert_string_equal(hear(), "");
 }
 
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test_setup_teardown(ready_is_said_once_and_again_after_a_reload, set_up, tear_down),
       cmocka_unit_test_setup_teardown(a_stuck_output_starves_the_watchdog, set_up, tear_down),
+      cmocka_unit_test_setup_teardown(patience_is_granted_and_taken_back, set_up, tear_down),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -38,6 +38,8 @@ def tells_ready_status_watchdog_reloading_and_stopping():
         assert "STATUS=showing" not in " ".join(heard)  # the uncompensated picture was up first
         for _ in range(5):
             manager.hear("WATCHDOG=1")
+        # Devices took their time with the watchdog's leave, and it was taken back.
+        assert manager.heard.index("WATCHDOG_USEC=120000000") < manager.heard.index("WATCHDOG_USEC=200000")
         run.wait_state("showing")
         if not any(line.startswith("STATUS=showing") for line in manager.heard):
             manager.hear("STATUS=showing")
@@ -120,25 +122,53 @@ def uses_the_directories_that_systemd_makes():
         assert run.stop()[0] == 0
 
 
+def units_for_analysis(folder):
+    """The units in a folder; the program is not installed yet: the one that was built stands for it."""
+    units = pathlib.Path(os.environ["CLT_UNITS"])
+    service = (units / "counterlight.service").read_text()
+    start = next(line for line in service.split("\n") if line.startswith("ExecStart="))
+    program = start.removeprefix("ExecStart=").split()[0]
+    assert program.endswith("/counterlightd") and program.startswith("/"), start
+    (pathlib.Path(folder) / "counterlight.service").write_text(service.replace(program, os.path.abspath(sys.argv[1])))
+    shutil.copy(units / "counterlight.socket", folder)
+    return service
+
+
+def analyze(*arguments):
+    return subprocess.run(["systemd-analyze", *arguments], capture_output=True, text=True)
+
+
 def the_units_are_valid():
     if shutil.which("systemd-analyze") is None:
         return "skip: systemd-analyze is not installed"
-    units = pathlib.Path(os.environ["CLT_UNITS"])
     with tempfile.TemporaryDirectory() as folder:
-        service = (units / "counterlight.service").read_text()
-        start = next(line for line in service.split("\n") if line.startswith("ExecStart="))
-        program = start.removeprefix("ExecStart=").split()[0]
-        assert program.endswith("/counterlightd") and program.startswith("/"), start
-        # The program is not installed yet: the one that was built stands for it.
-        (pathlib.Path(folder) / "counterlight.service").write_text(
-            service.replace(program, os.path.abspath(sys.argv[1])))
-        shutil.copy(units / "counterlight.socket", folder)
-        done = subprocess.run(["systemd-analyze", "verify", "--man=no", "--recursive-errors=one",
-                               f"{folder}/counterlight.service", f"{folder}/counterlight.socket"], capture_output=True,
-                              text=True)
+        service = units_for_analysis(folder)
+        done = analyze("verify", "--man=no", "--recursive-errors=one", f"{folder}/counterlight.service",
+                       f"{folder}/counterlight.socket")
         assert done.returncode == 0 and not done.stderr.strip(), done.stderr
-    for wanted in ("Type=notify", "WatchdogSec=", "Restart=always", "NoNewPrivileges=yes"):
+    for wanted in ("Type=notify", "WatchdogSec=", "Restart=always", "StartLimitIntervalSec=0", "LimitCORE=0"):
         assert wanted in service, wanted
+    return None
+
+
+def the_service_is_hardened():
+    """The exposure that systemd counts, out of 10; what is not on is explained in the unit."""
+    if shutil.which("systemd-analyze") is None:
+        return "skip: systemd-analyze is not installed"
+    with tempfile.TemporaryDirectory() as folder:
+        service = units_for_analysis(folder)
+        unit = f"{folder}/counterlight.service"
+        done = analyze("security", "--offline=true", "--no-pager", "--threshold=20", unit)
+        if "unrecognized option" in done.stderr:
+            return "skip: this systemd-analyze cannot look at units that are not loaded"
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert analyze("security", "--offline=true", "--no-pager", "--threshold=5", unit).returncode != 0
+        open_doors = [line.split()[1].split("=")[0] for line in done.stdout.split("\n") if line.startswith("\u2717")]
+    explained = "".join(line for line in service.split("\n") if line.startswith("#"))
+    named = set(open_doors) - {"RootDirectory", "DeviceAllow", "UMask"}
+    assert named, done.stdout
+    for name in named:
+        assert f"{name}=" in explained, f"{name} is off and not explained"
     return None
 
 
@@ -153,4 +183,4 @@ def states_are_printed_as_a_graph():
 
 if __name__ == "__main__":
     main([tells_ready_status_watchdog_reloading_and_stopping, takes_the_socket_that_systemd_passes, a_bad_file_at_reload_keeps_the_old_configuration,
-          uses_the_directories_that_systemd_makes, the_units_are_valid, states_are_printed_as_a_graph])
+          uses_the_directories_that_systemd_makes, the_units_are_valid, the_service_is_hardened, states_are_printed_as_a_graph])

@@ -1,10 +1,21 @@
 """Installs into a fresh folder and uses what is there: headers, library through pkg-config, programs, man pages, units."""
+import fnmatch
+import json
 import os
 import pathlib
 import shutil
 import subprocess
 import sys
 import tempfile
+
+# What is installed beside headers, pictures, scenes and charts; below the prefix, LIB being lib or what Debian makes of it.
+INSTALLED = """
+bin/counterlight sbin/counterlightd libexec/counterlight-display
+LIB/libcounterlight.so LIB/libcounterlight.so.0 LIB/libcounterlight.so.VERSION LIB/pkgconfig/counterlight.pc
+lib/systemd/system/counterlight.service lib/systemd/system/counterlight.socket lib/systemd/system/counterlight-cage.service
+lib/sysusers.d/counterlight.conf lib/tmpfiles.d/counterlight.conf lib/udev/rules.d/70-counterlight.rules
+share/man/man1/counterlight.1 share/man/man8/counterlightd.8
+""".split()
 
 PROGRAM = r"""
 #include <counterlight/counterlight.h>
@@ -35,6 +46,37 @@ def installed_files(build, root):
     return sorted(str(p.relative_to(root)) for p in pathlib.Path(root).rglob("*") if not p.is_dir())
 
 
+def below_the_prefix(build, files):
+    """The files' paths below the prefix, with the library folder and the version as INSTALLED has them."""
+    options = {o["name"]: o["value"] for o in json.loads(run("meson", "introspect", build, "--buildoptions"))}
+    version = json.loads(run("meson", "introspect", build, "--projectinfo"))["version"]
+    prefix = options["prefix"].strip("/") + "/"
+    assert all(f.startswith(prefix) for f in files), files
+    paths = [f.removeprefix(prefix) for f in files]
+    library = options["libdir"] + "/"
+    of_library = (library + "libcounterlight", library + "pkgconfig/")
+    paths = ["LIB/" + f.removeprefix(library) if f.startswith(of_library) else f for f in paths]
+    return [f.replace(f".so.{version}", ".so.VERSION") for f in paths]
+
+
+def nothing_is_missing_or_left_over(paths):
+    listed = [f for f in paths if not f.startswith(("include/counterlight/", "share/counterlight/"))]
+    wanted = [f for f in INSTALLED if shutil.which("scdoc") or "/man/" not in f]
+    assert sorted(listed) == sorted(wanted), set(listed) ^ set(wanted)
+
+
+def the_packages_take_every_file(paths):
+    """Each installed file is in exactly one of the Debian packages."""
+    debian = pathlib.Path(sys.argv[0]).resolve().parents[2] / "debian"
+    lists = {p.name: [line.split()[0] for line in p.read_text().splitlines() if line] for p in debian.glob("*.install")}
+    assert len(lists) == 3, lists
+    for path in paths:
+        packaged = "usr/" + path.replace("LIB/", "lib/x86_64-linux-gnu/").replace("VERSION", "0.1.0")
+        takers = [name for name, patterns in lists.items()
+                  if any(fnmatch.fnmatchcase(packaged, p) or fnmatch.fnmatchcase(packaged, p + "/*") for p in patterns)]
+        assert len(takers) == 1, (packaged, takers)
+
+
 def library_serves_a_program(build, root):
     pc = next(pathlib.Path(root).rglob("counterlight.pc"))
     environment = dict(os.environ, PKG_CONFIG_PATH=str(pc.parent), PKG_CONFIG_SYSROOT_DIR=root)
@@ -60,10 +102,13 @@ def main():
             return 77
     with tempfile.TemporaryDirectory() as root:
         files = installed_files(build, root)
-        for wanted in ("bin/counterlight", "bin/counterlightd", "include/counterlight/counterlight.h",
-                       "man1/counterlight.1", "man8/counterlightd.8", "counterlight.service", "counterlight.socket",
-                       "simulated.cfg", "scenes/dihedral.cfg", "counterlight.pc"):
-            assert any(wanted in f for f in files), f"{wanted} is not installed: {files}"
+        paths = below_the_prefix(build, files)
+        nothing_is_missing_or_left_over(paths)
+        the_packages_take_every_file(paths)
+        for wanted in ("share/counterlight/simulated.cfg", "share/counterlight/scenes/dihedral.cfg"):
+            assert wanted in paths, paths
+        display = next(pathlib.Path(root).rglob("counterlight-display"))
+        assert os.access(display, os.X_OK), display
         headers = {p.name for p in pathlib.Path(sys.argv[0]).parents[2].glob("include/counterlight/*.h")}
         installed = {os.path.basename(f) for f in files if f.endswith(".h")}
         assert headers == installed, headers ^ installed

@@ -233,13 +233,51 @@ static void change_repaints_cells(void **state) {
   pair_close(&pair);
 }
 
+static clt_status ask(rig_pair *pair, int64_t not_before_ns) {
+  clt_frame frame;
+  return pair->camera->driver->next(pair->camera, not_before_ns, 1e3, &frame, NULL);
+}
+
+/* A camera that was unplugged, seen or not, gives no frame until it is opened again, and opens while it is plugged in
+ * only. */
+static void an_unplugged_camera_must_be_opened_again(void **state) {
+  (void)state;
+  const int64_t second = 1000000000;
+  rig_pair pair = wide_open("", "faults = { gone_at_s = 2.0; gone_s = 3.0; gone_every_s = 10.0; };", "");
+  const float dark[WIDE_VALUES] = {0};
+  clt_error error = {0};
+  const struct {
+    int64_t within, behind; /* both in s: a time while it is away, and one at which it is back */
+  } gaps[] = {{4, 6}, {13, 17}, {23, 28}};
+  for (int n = 0; n < 3; n++) {
+    assert_int_equal(ask(&pair, (gaps[n].within - 3) * second), CLT_OK);
+    assert_int_equal(ask(&pair, (n == 1 ? gaps[n].behind : gaps[n].within) * second), CLT_GONE);
+    assert_int_equal(ask(&pair, 0), CLT_GONE);
+    pair.camera->driver->close(pair.camera);
+    pair.camera = NULL;
+    assert_int_equal(clt_scene_open_camera(pair.scene, &pair.camera, &error), n == 1 ? CLT_OK : CLT_GONE);
+    while (pair_show(&pair, dark) < gaps[n].behind * second) {
+    }
+    if (pair.camera == NULL) {
+      assert_ok(clt_scene_open_camera(pair.scene, &pair.camera, &error), error);
+    }
+  }
+  pair_close(&pair);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(flicker_is_integrated),      cmocka_unit_test(drift_dims_the_lamp),
-      cmocka_unit_test(rows_follow_each_other),     cmocka_unit_test(faults_by_chance),
-      cmocka_unit_test(torn_frames_are_dark_below), cmocka_unit_test(latency_varies_by_chance),
-      cmocka_unit_test(stuck_frames_repeat),        cmocka_unit_test(late_frames_move_the_clock),
-      cmocka_unit_test(vibration_shifts_slopes),    cmocka_unit_test(change_repaints_cells),
+      cmocka_unit_test(flicker_is_integrated),
+      cmocka_unit_test(drift_dims_the_lamp),
+      cmocka_unit_test(rows_follow_each_other),
+      cmocka_unit_test(faults_by_chance),
+      cmocka_unit_test(torn_frames_are_dark_below),
+      cmocka_unit_test(latency_varies_by_chance),
+      cmocka_unit_test(stuck_frames_repeat),
+      cmocka_unit_test(late_frames_move_the_clock),
+      cmocka_unit_test(vibration_shifts_slopes),
+      cmocka_unit_test(change_repaints_cells),
+      cmocka_unit_test(an_unplugged_camera_must_be_opened_again),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

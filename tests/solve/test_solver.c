@@ -320,6 +320,43 @@ static void what_one_channel_needed_is_told(void **state) {
   }
 }
 
+/* What a method says of its own residual is what a product with T finds, or more; the drive does not depend on it. */
+static void a_trusted_method_tells_the_truth(void **state) {
+  (void)state;
+  for (uint64_t seed = 1; seed <= 3; seed++) {
+    test_room room = tame_room(seed);
+    size_t values = 3 * room.cells;
+    double *x = room_numbers(values), *measured = room_numbers(values);
+    room_ask(&room, seed, 0.1, 0.9);
+    for (size_t m = 0; clt_method_name(m) != NULL; m++) {
+      clt_solve_options options = {.method = clt_method_name(m), .tolerance = 1e-3, .iteration_limit = 200};
+      clt_solve_result looked = solve_with(&room, &options, room.b, measured);
+      options.trust = true;
+      clt_solve_result told = solve_with(&room, &options, room.b, x);
+      double truth = room_residual(&room, x, room.b);
+      assert_memory_equal(x, measured, values * sizeof *x);
+      assert_near(looked.residual, truth, 1e-9);
+      assert_true(told.residual >= truth * (1 - 1e-6) - 1e-12);
+      assert_true(told.residual <= (told.converged ? fmax(truth, options.tolerance) : truth) * (1 + 1e-6) + 1e-12);
+    }
+    free(x);
+    free(measured);
+    room_free(&room);
+  }
+}
+
+/* A picture that leaves 0..1 is clipped or sought within: then the residual is measured whatever was said of trust. */
+static void what_is_clipped_is_measured(void **state) {
+  (void)state;
+  test_room room = tame_room(2);
+  room_ask(&room, 7, -0.3, 1.3);
+  clt_solve_options options = {.tolerance = 1e-4, .trust = true};
+  clt_solve_result result = solve_with(&room, &options, room.b, room.x);
+  assert_true(result.residual > 0.01);
+  assert_near(result.residual, room_residual(&room, room.x, room.b), 1e-9);
+  room_free(&room);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_solver_is_as_good_as_new),
@@ -330,6 +367,8 @@ int main(void) {
       cmocka_unit_test(bad_input_is_refused_by_every_method),
       cmocka_unit_test(a_transport_with_nan_is_refused_or_masked),
       cmocka_unit_test(what_one_channel_needed_is_told),
+      cmocka_unit_test(a_trusted_method_tells_the_truth),
+      cmocka_unit_test(what_is_clipped_is_measured),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

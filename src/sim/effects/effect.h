@@ -90,6 +90,8 @@ struct clt_effect {
   void (*radiance)(const void *state, float *radiance, float *scratch);
   /* Decides what becomes of frame number `sequence`; fate was zeroed by the caller. */
   void (*frame)(const void *state, uint32_t sequence, clt_fate *fate);
+  /* Whether the camera is unplugged at any time of from_ns <= t <= to_ns. */
+  bool (*away)(const void *state, int64_t from_ns, int64_t to_ns);
   /* Changes one band of an exposure; bands come from the top, and together cover it. */
   void (*expose)(const void *state, clt_exposure *exposure, const clt_band *band);
   /* Changes signal->radiance. */

@@ -181,6 +181,14 @@ void clt_plan_light(void *context, const float *drive, float *radiance) {
   }
 }
 
+bool clt_plan_away(const clt_plan *plan, int64_t from_ns, int64_t to_ns) {
+  bool away = false;
+  for (int k = 0; k < plan->count && !away; k++) {
+    away = plan->stages[k].effect->away != NULL && plan->stages[k].effect->away(plan->stages[k].state, from_ns, to_ns);
+  }
+  return away;
+}
+
 clt_fate clt_plan_frame(const clt_plan *plan, uint32_t sequence) {
   clt_fate fate = {0};
   for (int k = 0; k < plan->count; k++) {

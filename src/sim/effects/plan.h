@@ -37,6 +37,7 @@ void clt_plan_radiance(const clt_plan *plan, float *radiance, float *scratch);
  * context is the scene. One call at a time. */
 void clt_plan_light(void *context, const float *drive, float *radiance);
 
+bool clt_plan_away(const clt_plan *plan, int64_t from_ns, int64_t to_ns);
 clt_fate clt_plan_frame(const clt_plan *plan, uint32_t sequence);
 void clt_plan_expose(const clt_plan *plan, clt_exposure *exposure, const clt_band *bands, int count);
 void clt_plan_signal(const clt_plan *plan, clt_signal *signal);

@@ -11,7 +11,7 @@
 #include "tradeoff/reproduce/cube.h"
 #include "tradeoff/reproduce/figures.h"
 
-static const double WANTED = 0.01, REPORT_UNIT_MS = 0.557, LONG_S = 3.0;
+static const double WANTED = 0.01, REPORT_UNIT_MS = 0.557, LONG_S = 3.0, SHORT_S = 0.1;
 enum { GROWTH_FROM = 5120, ALL_METHODS_UP_TO = 2048 };
 static const double ALBEDO[CLT_CUBE_SIDES] = {0.4, 0.4, 0.4, 0.4, 0.4, 0.4};
 
@@ -177,23 +177,32 @@ static clt_status run_series(const clt_reproduce_options *options, const room *o
   return status;
 }
 
-/* Solves from `start` (NULL: zero) until a tolerance brings the error of l_d below 1 %. The fastest of some solves
- * counts, over seconds `for_s` at least: enough to meet one that nothing else on the machine disturbs. */
-static clt_status run_method(const room *of, const clt_transport *transport, const char *method, const double *start,
-                             double for_s, outcome *found, clt_error *error) {
+/* How a method is measured: what it starts from (NULL: zero), for how many seconds at least, and whether a product with
+ * T after every solve empties the caches. */
+typedef struct conditions {
+  const double *start;
+  double for_s;
+  bool emptied;
+} conditions;
+
+/* Solves until a tolerance brings the error of l_d below 1 %. The fastest of some solves counts: enough to meet one
+ * that nothing else on the machine disturbs. */
+static clt_status run_method(const room *of, const clt_transport *transport, const char *method,
+                             const conditions *under, outcome *found, clt_error *error) {
   enum { REPEATS = 5, REPEATS_MAX = 500, TOLERANCES = 5 };
   double tolerance = WANTED;
   clt_status status = CLT_OK;
   *found = (outcome){.error = 1.0, .ms = INFINITY};
   for (int try = 0; try < TOLERANCES && status == CLT_OK && !(found->error <= WANTED); try++, tolerance *= 0.5) {
     clt_solver *solver = NULL;
-    clt_solve_options options = {.method = method, .tolerance = tolerance};
+    clt_solve_options options = {.method = method, .tolerance = tolerance, .trust = !under->emptied};
     clt_solve_result result = {0};
     status = clt_solver_create(transport, of->certificate, &options, &solver, error);
     found->ms = INFINITY;
     int64_t start_ns = clt_clock_ns();
-    for (int k = 0; k < REPEATS_MAX && status == CLT_OK && (k < REPEATS || clt_clock_since(start_ns) < for_s); k++) {
-      status = clt_solver_run(solver, of->seen, start, of->drive, &result, error);
+    for (int k = 0; k < REPEATS_MAX && status == CLT_OK && (k < REPEATS || clt_clock_since(start_ns) < under->for_s);
+         k++) {
+      status = clt_solver_run(solver, of->seen, under->start, of->drive, &result, error);
       found->ms = fmin(found->ms, 1e3 * result.method_seconds);
     }
     found->prepare_s = result.prepare_seconds;
@@ -210,7 +219,8 @@ static void find_best(const room *of, outcome *best, const char **name) {
   for (size_t k = 0; clt_method_name(k) != NULL; k++) {
     outcome found;
     bool ready = of->cells <= ALL_METHODS_UP_TO || !clt_method_invests(k) || strcmp(clt_method_name(k), "wavelet") == 0;
-    if (ready && run_method(of, of->transport, clt_method_name(k), NULL, 0.1, &found, NULL) == CLT_OK &&
+    if (ready &&
+        run_method(of, of->transport, clt_method_name(k), &(conditions){.for_s = SHORT_S}, &found, NULL) == CLT_OK &&
         found.error <= WANTED && found.ms < best->ms) {
       *best = found;
       *name = clt_method_name(k);
@@ -231,11 +241,13 @@ static double slope(const clt_chart_line *line) {
 typedef struct ladder {
   clt_chart chart;
   const char *best_method;
-  outcome series, iterative, twice, wavelet, best; /* of the last rung; twice: the iteration on T in double */
+  /* of the last rung; twice: the iteration on T in double; emptied: the wavelets from memory */
+  outcome series, iterative, twice, wavelet, emptied, best;
 } ladder;
 
 static clt_status climb(const clt_reproduce_options *options, ladder *on, const struct rung *rung, clt_error *error) {
   room of = {0};
+  const conditions warm = {.for_s = LONG_S}, emptied = {.for_s = LONG_S, .emptied = true};
   clt_status status = clt_figure_step(options, error, "Fig. 10, N = %d: the box", rung->cells);
   if (status == CLT_OK) {
     status = room_init(&of, rung, error);
@@ -246,14 +258,18 @@ static clt_status climb(const clt_reproduce_options *options, ladder *on, const 
   if (status == CLT_OK) {
     status = clt_figure_step(options, error, "Fig. 10, N = %d: iterations", rung->cells);
   }
+  const conditions report = {.start = of.start, .for_s = LONG_S};
   if (status == CLT_OK) {
-    status = run_method(&of, of.exact, "jacobi", of.start, LONG_S, &on->twice, error);
+    status = run_method(&of, of.exact, "jacobi", &report, &on->twice, error);
   }
   if (status == CLT_OK) {
-    status = run_method(&of, of.transport, "jacobi", of.start, LONG_S, &on->iterative, error);
+    status = run_method(&of, of.transport, "jacobi", &report, &on->iterative, error);
   }
   if (status == CLT_OK) {
-    status = run_method(&of, of.transport, "wavelet", NULL, LONG_S, &on->wavelet, error);
+    status = run_method(&of, of.transport, "wavelet", &emptied, &on->emptied, error);
+  }
+  if (status == CLT_OK) {
+    status = run_method(&of, of.transport, "wavelet", &warm, &on->wavelet, error);
   }
   if (status == CLT_OK) {
     find_best(&of, &on->best, &on->best_method);
@@ -282,8 +298,9 @@ static void judge(const ladder *on, const struct rung *last, clt_reproduction *o
   snprintf(text, sizeof text, "wavelets are %.3g times as fast as the iteration at N = %d",
            last->iterative / last->wavelet, last->cells);
   clt_reproduced_add(out, "Fig. 10, wavelet", text, wavelet >= last->iterative / last->wavelet,
-                     "%.3g times (%.3g ms to %.2g %%; made ready in %.3g s); %.3g times the iteration on T in double",
-                     wavelet, on->wavelet.ms, 100 * on->wavelet.error, on->wavelet.prepare_s,
+                     "%.3g times (%.3g ms to %.2g %%, %.3g ms with the caches emptied before; made ready in %.3g s); "
+                     "%.3g times the iteration on T in double",
+                     wavelet, on->wavelet.ms, 100 * on->wavelet.error, on->emptied.ms, on->wavelet.prepare_s,
                      on->twice.ms / on->wavelet.ms);
   snprintf(text, sizeof text, "its best, the wavelets, takes %.3g ms at N = %d", last->wavelet * REPORT_UNIT_MS,
            last->cells);
@@ -336,8 +353,8 @@ const clt_figure clt_figure_ladder = {
     .caption = "Series, iteration and wavelets as the transport grows, all to an error of 1 %, beside the report's "
                "times (Matlab, 2010) and the best method here. The series (dgemm) computes in double as the "
                "report's Matlab does; the iteration and the wavelets read T and its coefficients in single precision, "
-               "as this library stores them, and add in double. Making a method ready is not counted, as there. What "
-               "else runs on the machine weighs on the iteration, which "
-               "reads all of T at every step.",
+               "as this library stores them, and add in double. Making a method ready is not counted, as there, and "
+               "solves follow one another, so that what fits a cache stays in it. What else "
+               "runs on the machine weighs on the iteration, which reads all of T at every step.",
     .files = {{"fig10.svg", "Time to 1 %, lines of this machine solid, the report's dashed.", true}},
     .compute = compute};

@@ -1,0 +1,31 @@
+/* A film that plays: decoded ahead in a thread of its own, handed out by presentation time. A decoder that is slower
+ * than its film slows the film down; it never leaves the glass empty, for what was handed out last stays. */
+#ifndef CLT_DAEMON_PLAYER_H
+#define CLT_DAEMON_PLAYER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "counterlight/status.h"
+#include "image/film.h"
+
+typedef struct player player;
+
+typedef struct player_frame {
+  const uint8_t *codes; /* the player's, until the next one is taken */
+  clt_film_frame shape;
+  int64_t due_ns; /* when it is to be on the glass; clt_clock_ns */
+} player_frame;
+
+/* Opens the film and starts to decode: the first frame is due at once. */
+clt_status player_create(const char *path, const clt_film_options *options, player **out, clt_error *error);
+void player_destroy(player *self); /* accepts NULL */
+/* The latest frame that is due by then; false where there is none that was not handed out before. *skipped: how many
+ * were due before it and are passed over. */
+bool player_take(player *self, int64_t until_ns, player_frame *frame, int *skipped);
+/* Seconds from now until the next decoded frame is due (0: it is; infinite: none is decoded). */
+double player_due(player *self);
+/* Why the film stands still; false where it does not. */
+bool player_failed(player *self, clt_error *error);
+
+#endif

@@ -1,0 +1,78 @@
+#include "image/video_shim.h"
+
+#include <cmath>
+#include <memory>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+#include <string>
+
+#include "image/opencv_guard.hpp"
+
+struct clt_video {
+  std::string path;
+  cv::VideoCapture capture;
+  cv::Mat frame;
+  int width, height;
+};
+
+namespace {
+
+constexpr double usual_rate_hz = 25, highest_rate_hz = 1000;
+
+clt_status open_file(clt_video *video, clt_error *error) {
+  if (!video->capture.open(video->path) || !video->capture.read(video->frame) || video->frame.type() != CV_8UC3) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "%s: is no video that can be decoded; AVI with Motion JPEG is read everywhere, other kinds where "
+                    "OpenCV has FFmpeg or GStreamer",
+                    video->path.c_str());
+  }
+  return CLT_OK;
+}
+
+} // namespace
+
+clt_status clt_video_open(const char *path, clt_video **out, clt_video_info *info, clt_error *error) {
+  return clt_guarded(path, "cannot be opened", error, [&] {
+    auto video = std::make_unique<clt_video>();
+    video->path = path;
+    clt_status status = open_file(video.get(), error);
+    if (status != CLT_OK) {
+      return status;
+    }
+    double rate_hz = video->capture.get(cv::CAP_PROP_FPS);
+    bool sane = std::isfinite(rate_hz) && rate_hz > 0 && rate_hz <= highest_rate_hz;
+    video->width = video->frame.cols;
+    video->height = video->frame.rows;
+    *info = {video->width, video->height, sane ? rate_hz : usual_rate_hz};
+    status = clt_video_rewind(video.get(), error);
+    *out = status == CLT_OK ? video.release() : nullptr;
+    return status;
+  });
+}
+
+void clt_video_close(clt_video *video) {
+  delete video;
+}
+
+clt_status clt_video_read(clt_video *video, const int rectangle[4], uint8_t *codes, bool *end, clt_error *error) {
+  return clt_guarded(video->path.c_str(), "cannot be decoded", error, [&] {
+    bool more = video->capture.read(video->frame);
+    // A frame of another size, as a damaged file may have, ends the film as well.
+    *end = !more || video->frame.cols != video->width || video->frame.rows != video->height;
+    if (!*end) {
+      cv::Mat wanted(rectangle[3], rectangle[2], CV_8UC3, codes);
+      cv::cvtColor(video->frame(cv::Rect(rectangle[0], rectangle[1], rectangle[2], rectangle[3])), wanted,
+                   cv::COLOR_BGR2RGB);
+    }
+    return CLT_OK;
+  });
+}
+
+// Not every decoder seeks: the file is opened again.
+clt_status clt_video_rewind(clt_video *video, clt_error *error) {
+  return clt_guarded(video->path.c_str(), "cannot be opened again", error, [&] {
+    return video->capture.open(video->path)
+               ? CLT_OK
+               : clt_fail(error, CLT_BAD_INPUT, "%s: cannot be opened again; is it there?", video->path.c_str());
+  });
+}

@@ -1,0 +1,138 @@
+/* Live solvers: which form serves, and what is told of a frame. */
+#include "solve/live.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/memory.h"
+
+static clt_status check_options(const clt_live_options *options, const clt_transport_info *info, clt_error *error) {
+  if (options != NULL && !(options->target_error >= 0 && options->target_error < 1)) {
+    return clt_fail(error, CLT_BAD_INPUT, "target_error is %g; it is a relative error, 0..1 (0: the default)",
+                    options->target_error);
+  }
+  if (options != NULL && !(options->budget_ms >= 0 && isfinite(options->budget_ms))) {
+    return clt_fail(error, CLT_BAD_INPUT, "budget_ms is %g; it is a time, 0 or more (0: no limit)", options->budget_ms);
+  }
+  if (info->rows != info->cols) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "the transport observes %zu cells but drives %zu; moving pictures need a camera that shares the "
+                    "projector's grid",
+                    info->rows, info->cols);
+  }
+  return CLT_OK;
+}
+
+static void measure_white(clt_live *live) {
+  double sum = 0;
+  for (int c = 0; c < live->info.channels; c++) {
+    const clt_channel_certificate *known = clt_certificate_channel(live->certificate, c);
+    sum += known->white * known->white * (double)known->lit;
+  }
+  live->white_norm = sqrt(sum);
+}
+
+/* The hierarchy, where the storage allows one. */
+static clt_status choose_form(clt_live *live, clt_error *error) {
+  static const double LEFT_OUT = 1e-3; /* by a leaf, of a cell's light */
+  clt_status status = CLT_OK;
+  if (strcmp(live->info.storage, "blocks") == 0) {
+    status = clt_transport_create_hierarchy(live->transport, LEFT_OUT, &live->made, error);
+    live->transport = live->made;
+  }
+  live->form =
+      live->made != NULL || strcmp(live->info.storage, "hierarchy") == 0 ? &clt_live_hierarchic : &clt_live_general;
+  return status;
+}
+
+clt_status clt_live_create(const clt_transport *transport, const clt_certificate *certificate,
+                           const clt_live_options *options, clt_live **out, clt_error *error) {
+  static const double DEFAULT_ERROR = 1e-3;
+  const clt_transport_info info = clt_transport_describe(transport);
+  *out = NULL;
+  clt_status status = check_options(options, &info, error);
+  if (status != CLT_OK) {
+    return status;
+  }
+  clt_live *live = clt_alloc(1, sizeof *live);
+  if (live == NULL) {
+    return clt_fail(error, CLT_FAILED, "no memory for moving pictures");
+  }
+  *live = (clt_live){.transport = transport, .certificate = certificate, .info = info};
+  live->options = options != NULL ? *options : (clt_live_options){0};
+  live->options.target_error = live->options.target_error > 0 ? live->options.target_error : DEFAULT_ERROR;
+  measure_white(live);
+  status = choose_form(live, error);
+  if (status == CLT_OK) {
+    status = live->form->create(live, error);
+  }
+  if (status != CLT_OK) {
+    clt_live_destroy(live);
+    return status;
+  }
+  *out = live;
+  return CLT_OK;
+}
+
+void clt_live_destroy(clt_live *live) {
+  if (live != NULL) {
+    if (live->form != NULL) {
+      live->form->destroy(live);
+    }
+    clt_transport_destroy(live->made);
+    free(live);
+  }
+}
+
+double clt_live_size(const clt_live *live, const float *target) {
+  double sum = 0;
+  for (int c = 0; c < live->info.channels; c++) {
+    const unsigned char *lit = clt_certificate_lit(live->certificate, c);
+    const float *values = target + (size_t)c * live->info.cols;
+    for (size_t i = 0; i < live->info.cols; i++) {
+      sum += lit[i] ? (double)values[i] * (double)values[i] : 0;
+    }
+  }
+  return sum > 0 ? sqrt(sum) : live->white_norm > 0 ? live->white_norm : 1;
+}
+
+/* What the operator may be off by of what is seen: as its check patterns found it, and what the hierarchy left out. */
+static double operator_error(const clt_live *live) {
+  const double checked = clt_transport_origin(live->transport)->error;
+  return hypot(checked > 0 ? checked : 0, clt_transport_simplified(live->transport));
+}
+
+static clt_status check_target(const clt_live *live, const float *target, clt_error *error) {
+  const size_t values = (size_t)live->info.channels * live->info.cols;
+  float worst = 0;
+  for (size_t at = 0; at < values; at++) {
+    worst += target[at] * 0; /* NaN for one that is not finite */
+  }
+  return worst == 0 ? CLT_OK
+                    : clt_fail(error, CLT_BAD_INPUT, "a target of moving pictures has values that are not finite");
+}
+
+clt_status clt_live_solve(clt_live *live, const float *target, float *drive, clt_live_result *result,
+                          clt_error *error) {
+  live->start_ns = clt_clock_ns();
+  *result = (clt_live_result){0};
+  clt_status status = check_target(live, target, error);
+  if (status == CLT_OK) {
+    status = live->form->solve(live, target, drive, result, error);
+  }
+  if (status == CLT_OK) {
+    result->error = hypot(result->residual, live->seen * operator_error(live));
+    result->total_ms = 1e3 * clt_clock_since(live->start_ns);
+  }
+  return status;
+}
+
+void clt_live_reset(clt_live *live) {
+  live->form->reset(live);
+}
+
+void clt_live_set_budget(clt_live *live, double budget_ms) {
+  live->options.budget_ms = budget_ms;
+}
