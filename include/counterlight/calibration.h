@@ -58,6 +58,19 @@ typedef struct clt_calibration_info {
 CLT_PUBLIC clt_status clt_calibrate(clt_projector *projector, clt_camera *camera, const clt_calibrate_options *options,
                                     const char *source, clt_calibration **out, clt_error *error);
 CLT_PUBLIC void clt_calibration_destroy(clt_calibration *calibration); /* accepts NULL */
+
+/* Measures the geometry alone again, on devices whose latency, responses and noise are still those of `known` (a camera
+ * that was knocked, not another one): *out is `known` with the new map, pitch, coverage, date and findings. Takes the
+ * Gray code's pictures and a few to find the exposure. CLT_BAD_INPUT where the devices have other sizes than `known`;
+ * CLT_FAILED, `known` being better, where no pixel is decoded, exposure or gain move by themselves, or less than half
+ * as much of the panel is seen as in `known`. Of options, levels, frames and watch_s are not used. */
+CLT_PUBLIC clt_status clt_calibrate_geometry(const clt_calibration *known, clt_projector *projector, clt_camera *camera,
+                                             const clt_calibrate_options *options, clt_calibration **out,
+                                             clt_error *error);
+/* How far what the camera sees has moved from one calibration to another of the same sizes: median over pixels decoded
+ * in both, camera pixels (panel distance over the first one's pitch); infinite where no pixel is. */
+CLT_PUBLIC clt_status clt_calibration_moved(const clt_calibration *before, const clt_calibration *after, double *pixels,
+                                            clt_error *error);
 CLT_PUBLIC clt_calibration_info clt_calibration_describe(const clt_calibration *calibration);
 
 /* What is wrong and what to do about it, in one line: index 0.. until NULL. *serious: what is measured with this rig is
@@ -68,6 +81,8 @@ CLT_PUBLIC const char *clt_calibration_finding(const clt_calibration *calibratio
  * missing, damaged or out of range. */
 CLT_PUBLIC clt_status clt_calibration_save(const clt_calibration *calibration, const char *path, clt_error *error);
 CLT_PUBLIC clt_status clt_calibration_load(const char *path, clt_calibration **out, clt_error *error);
+/* When the calibration in a file was made (clt_calibration_info.calibrated), without reading the rest. */
+CLT_PUBLIC clt_status clt_calibration_date(const char *path, int64_t *calibrated, clt_error *error);
 
 /* Puts responses, noise, exposures and latency into a rig's settings, and the calibration itself as its geometry: it
  * must outlive rigs that are opened with them. */

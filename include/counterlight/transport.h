@@ -38,7 +38,7 @@ typedef struct clt_provenance {
 typedef struct clt_transport_info {
   int width, height, channels;
   size_t rows, cols;   /* cols = width * height; rows = cols where one camera shares the projector's grid */
-  const char *storage; /* "dense", "dense64", "dense16", "dense8", "tree", "blocks" */
+  const char *storage; /* "dense", "dense64", "dense16", "dense8", "tree", "blocks", "hierarchy" */
   size_t bytes;        /* memory that one product of every channel reads */
 } clt_transport_info;
 
@@ -82,6 +82,18 @@ typedef struct clt_block_parts {
  * flux negative. */
 CLT_PUBLIC clt_status clt_transport_create_blocks(int width, int height, int channels, const clt_block_parts *parts,
                                                   clt_transport **out, clt_error *error);
+
+/* Makes a transport in "hierarchy" storage from one in "blocks" storage: near light as it is, far light by the leaves of
+ * a block tree over which it varies bilinearly, so that a product reads little more than one number a cell, and noise
+ * of the columns is smoothed. tolerance (0 or more, below 1): rms of a cell's light, all blocks together and relative to
+ * its own, that a leaf may leave out; noise is not told by finer leaves either. Every row keeps its sum. Black, flood,
+ * deviations and provenance are copied. Time and memory grow with the cells times the blocks. CLT_BAD_INPUT for another
+ * storage. */
+CLT_PUBLIC clt_status clt_transport_create_hierarchy(const clt_transport *from, double tolerance, clt_transport **out,
+                                                     clt_error *error);
+/* Relative RMS by which products with a hierarchy differ from those with what it was made from: the worst of several
+ * patterns; 0 of other storage, which is the transport itself. */
+CLT_PUBLIC double clt_transport_simplified(const clt_transport *transport);
 
 /* Makes a copy in another dense storage, from any storage: entries, black, flood, deviations and provenance. Errors are
  * relative to the largest entry off the diagonal of a row (max_i) or of 32 neighbours in it (max_b); "rms" is what they

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "counterlight/replay.h"
+#include "device/camera/libcamera.h"
 #include "device/camera/v4l2.h"
 
 /* Where neither the file nor a scene says. */
@@ -48,10 +49,21 @@ static clt_status open_v4l2_camera(const clt_camera_config *config, clt_scene *s
 }
 #endif
 
+#ifdef CLT_HAVE_LIBCAMERA
+static clt_status open_libcamera_camera(const clt_camera_config *config, clt_scene *scene, clt_camera **out,
+                                        clt_error *error) {
+  (void)scene;
+  return clt_libcamera_camera_open(config, out, error);
+}
+#endif
+
 static const driver_entry drivers[] = {
     {"simulated", open_simulated_projector, open_simulated_camera},
 #ifdef CLT_HAVE_V4L2
     {"v4l2", NULL, open_v4l2_camera},
+#endif
+#ifdef CLT_HAVE_LIBCAMERA
+    {"libcamera", NULL, open_libcamera_camera},
 #endif
 };
 enum { DRIVERS = sizeof drivers / sizeof drivers[0] };

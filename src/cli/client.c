@@ -119,6 +119,13 @@ static void print_reacquired(const json_t *found) {
              100 * number_of(found, "off_before"));
     }
   }
+  const json_t *geometry = json_object_get(found, "geometry");
+  if (json_is_true(json_object_get(geometry, "adopted"))) {
+    printf("geometry   new: the camera moved by %.2g of its pixels and sees %.3g %% of the panel\n",
+           number_of(geometry, "moved"), 100 * number_of(geometry, "covered"));
+  } else if (json_is_object(geometry)) {
+    printf("geometry   stays: %s\n", text_of(geometry, "why"));
+  }
 }
 
 static void print_drift(const json_t *drift) {

@@ -4,6 +4,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "daemon/control.h"
+#include "daemon/geometry.h"
 
 /* Longest time from the wish to stop to the end, s; a solve that cannot be interrupted is left behind then. */
 static const double grace_s = 1.0;
@@ -15,6 +16,7 @@ static void order(control *self, output_order_kind kind) {
     letter->kind = kind;
     letter->station = self->config.station;
     notify_patience(&self->notify, true);
+    geometry_choose(self->config.state, &letter->station);
     clt_mailbox_put(self->boxes->orders, letter);
   }
 }
@@ -46,14 +48,9 @@ static void load(control *self) {
 
 /* Less than the whole transport is measured only where there is one of this rig to begin with. */
 static measure_kind scope(const control *self) {
-  const control_findings *found = &self->found;
-  bool less = self->wishes.scope == MEASURE_PHOTOMETRY || self->wishes.scope == MEASURE_CHANGED;
-  if (!less || found->model == NULL) {
-    return MEASURE_ACQUIRE;
-  }
-  clt_transport_info info = clt_transport_describe(found->model->transport);
-  bool fits = info.width == found->width && info.height == found->height && info.channels == found->channels;
-  return fits && info.rows == info.cols ? self->wishes.scope : MEASURE_ACQUIRE;
+  measure_kind wanted = self->wishes.scope;
+  bool less = wanted == MEASURE_PHOTOMETRY || wanted == MEASURE_CHANGED;
+  return wanted == MEASURE_GEOMETRY || (less && control_has_model(self)) ? wanted : MEASURE_ACQUIRE;
 }
 
 static void acquire(control *self) {

@@ -26,6 +26,8 @@ typedef struct control_wishes {
   unsigned solver;        /* bit set of solver_kind */
   bool acquire;           /* a new transport is owed, through failures and retries, until it serves */
   measure_kind scope;     /* of that: MEASURE_PHOTOMETRY, MEASURE_CHANGED, else all of it */
+  measure_kind scope;     /* of that: MEASURE_PHOTOMETRY, MEASURE_CHANGED, MEASURE_GEOMETRY, else all of it */
+  bool open;              /* devices to be opened again once `measure` is idle */
   bool refine;            /* asked for, at the next verification */
   bool snapshot;          /* to be written when the picture has been photographed */
   int content_descriptor; /* of SOLVER_CONTENT; -1: the configured picture */
@@ -114,6 +116,8 @@ clt_status control_reload(control *self, const char **restart, clt_error *error)
 void control_act(control *self, machine_action action);
 
 /* jobs.c */
+/* Whether there is a square transport of the rig's grid. */
+bool control_has_model(const control *self);
 void control_measure(control *self, measure_kind kind);
 void control_want(control *self, solver_kind kind);
 /* Tells the solver to give up what can wait. */

@@ -7,6 +7,17 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "daemon/control.h"
+#include "daemon/geometry.h"
+
+bool control_has_model(const control *self) {
+  const control_findings *found = &self->found;
+  if (found->model == NULL) {
+    return false;
+  }
+  clt_transport_info info = clt_transport_describe(found->model->transport);
+  return info.width == found->width && info.height == found->height && info.channels == found->channels &&
+         info.rows == info.cols;
+}
 
 void control_measure(control *self, measure_kind kind) {
   measure_job *job = clt_alloc(1, sizeof *job);
@@ -25,8 +36,9 @@ void control_measure(control *self, measure_kind kind) {
     clt_log(CLT_LOG_ERROR, "the picture cannot be verified: %s", error.message);
     job->kind = MEASURE_NOTHING;
   }
-  bool modelled = pictured || kind == MEASURE_PHOTOMETRY || kind == MEASURE_CHANGED;
-  job->model = modelled ? model_hold(self->found.model) : NULL;
+  bool renewed = kind == MEASURE_PHOTOMETRY || kind == MEASURE_CHANGED || kind == MEASURE_GEOMETRY;
+  job->model = pictured || (renewed && control_has_model(self)) ? model_hold(self->found.model) : NULL;
+  geometry_file(self->config.state, job->calibration);
   self->work.measure_number = job->number;
   self->work.measuring = true;
   clt_mailbox_put(self->boxes->measure_jobs, job);
@@ -177,6 +189,7 @@ static void take_measured(control *self, measure_result *letter) {
     break;
   case MEASURE_PHOTOMETRY:
   case MEASURE_CHANGED:
+  case MEASURE_GEOMETRY:
     control_on_renewal(self, letter);
     take_transport(self, letter);
     break;

@@ -7,6 +7,7 @@
  *   solver    (solver.c)   owns the content, the transport with its certificate, and the files of the state directory
  *   moving    (moving.c)   owns the film that plays (player.c, with a thread that decodes) and makes a moving picture
  *                          of each frame
+ *                          (calibration.h5 is measure's)
  *   control   (control.c)  owns the state machine, the control socket, signals, timers and the watchdog; decides what
  *                          the others do and keeps copies of what they found
  *
@@ -114,6 +115,7 @@ typedef enum measure_kind {
   MEASURE_REFINE,
   MEASURE_PHOTOMETRY, /* black and gain anew */
   MEASURE_CHANGED,    /* what changed anew, by a few photographs where they explain it */
+  MEASURE_GEOMETRY,   /* what each camera pixel sees anew, then as MEASURE_CHANGED */
   MEASURE_STOP
 } measure_kind;
 
@@ -134,7 +136,9 @@ typedef struct measure_job {
   clt_station *station;         /* CALIBRATE */
   clt_projector_info projector; /* CALIBRATE */
   daemon_picture picture;       /* VERIFY, REFINE */
-  daemon_model *model;          /* VERIFY, REFINE, PHOTOMETRY, CHANGED; held; NULL: none in hand */
+  daemon_model *model;          /* VERIFY, REFINE, PHOTOMETRY, CHANGED, GEOMETRY; held; NULL: none in hand */
+
+  char calibration[CLT_PATH_MAX]; /* GEOMETRY: file for the new one */
 } measure_job;
 
 typedef struct measure_progress {
@@ -150,6 +154,14 @@ typedef struct refinement {
   double before, after, noise;
 } refinement;
 
+/* What came of measuring the geometry again. */
+typedef struct geometry_renewal {
+  bool measured, adopted; /* not adopted: the earlier one is better, and why says so */
+  double covered;         /* share of the panel that is seen */
+  double moved;           /* camera pixels, median */
+  char why[CLT_MESSAGE_MAX];
+} geometry_renewal;
+
 typedef enum renew_outcome { RENEW_NONE, RENEW_FITS, RENEW_GAIN, RENEW_REPAINT, RENEW_MEASURE } renew_outcome;
 /* What was found to have changed; before and after: of the photograph that fits worst. */
 typedef struct renewal {
@@ -157,6 +169,7 @@ typedef struct renewal {
   int patterns; /* that it took, those of a whole acquisition included */
   size_t rows;  /* REPAINT: that got a factor of their own, of all channels */
   clt_fit before, after;
+  geometry_renewal geometry; /* of MEASURE_GEOMETRY; where it is not adopted, nothing else was looked at */
 } renewal;
 
 typedef struct measure_result {
@@ -167,8 +180,8 @@ typedef struct measure_result {
   char camera[32];  /* CALIBRATE: its driver */
   clt_rig_info rig; /* CALIBRATE; its texts are the two below */
   char response[32], source[CLT_TEXT_MAX];
-  clt_transport *transport; /* ACQUIRE, PHOTOMETRY, CHANGED; NULL: the one in use fits */
-  renewal renewed;          /* PHOTOMETRY, CHANGED */
+  clt_transport *transport; /* ACQUIRE, PHOTOMETRY, CHANGED, GEOMETRY; NULL: the one in use fits */
+  renewal renewed;          /* PHOTOMETRY, CHANGED, GEOMETRY */
   clt_image observation;    /* VERIFY, REFINE: radiance */
   double verified_error;    /* VERIFY, REFINE: ||y - target|| / ||target|| over lit cells */
   refinement refined;       /* REFINE */

@@ -8,6 +8,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "daemon/geometry.h"
 #include "daemon/refine.h"
 #include "daemon/renew.h"
 #include "daemon/standin.h"
@@ -108,22 +109,39 @@ static clt_status acquire(measurer *self, const measure_job *job, measure_result
   return clt_acquire(self->station->rig, &options, &result->transport, &result->error);
 }
 
+static clt_status measure_all(measurer *self, const measure_job *job, measure_result *result) {
+  clt_status status = acquire(self, job, result);
+  result->renewed.outcome = RENEW_MEASURE;
+  result->renewed.patterns += status == CLT_OK ? clt_transport_origin(result->transport)->patterns : 0;
+  return status;
+}
+
 /* Black and flood are photographed so often where the configuration leaves it open. */
 enum { RENEW_REPEATS = 4 };
 
 static clt_status renew(measurer *self, const measure_job *job, measure_result *result) {
   int repeats = job->config.acquire.repeats;
-  renew_options options = {.changed = job->kind == MEASURE_CHANGED,
+  renew_options options = {.changed = job->kind != MEASURE_PHOTOMETRY,
                            .repeats = repeats > 0 ? repeats : RENEW_REPEATS,
                            .progress = on_progress,
                            .context = self};
   self->reported_ns = 0;
   clt_status status =
       renew_transport(self->station->rig, job->model, &options, &result->transport, &result->renewed, &result->error);
-  if (status == CLT_OK && result->renewed.outcome == RENEW_MEASURE) {
-    status = acquire(self, job, result);
-    result->renewed.patterns += status == CLT_OK ? clt_transport_origin(result->transport)->patterns : 0;
+  return status == CLT_OK && result->renewed.outcome == RENEW_MEASURE ? measure_all(self, job, result) : status;
+}
+
+/* With the new map T may fit again; what else changed is looked for as for MEASURE_CHANGED. */
+static clt_status renew_geometry(measurer *self, const measure_job *job, measure_result *result) {
+  geometry_renewal found;
+  self->reported_ns = 0;
+  clt_status status = geometry_renew(job, self->station, self->standin, on_progress, self, &found, &result->error);
+  if (status == CLT_OK && job->model == NULL) {
+    status = measure_all(self, job, result);
+  } else if (status == CLT_OK && found.adopted) {
+    status = renew(self, job, result);
   }
+  result->renewed.geometry = found;
   return status;
 }
 
@@ -233,6 +251,8 @@ static clt_status work(measurer *self, measure_job *job, measure_result *result)
   case MEASURE_PHOTOMETRY:
   case MEASURE_CHANGED:
     return renew(self, job, result);
+  case MEASURE_GEOMETRY:
+    return renew_geometry(self, job, result);
   case MEASURE_VERIFY:
     return verify(self, job, result);
   case MEASURE_REFINE:

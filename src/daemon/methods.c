@@ -40,7 +40,7 @@ static measure_kind scope_kind(const char *scope) {
     measure_kind kind;
   } scopes[] = {{"transport", MEASURE_ACQUIRE},
                 {"photometry", MEASURE_PHOTOMETRY},
-                {"geometry", MEASURE_CALIBRATE},
+                {"geometry", MEASURE_GEOMETRY},
                 {"changed", MEASURE_CHANGED}};
   for (size_t i = 0; scope != NULL && i < sizeof scopes / sizeof scopes[0]; i++) {
     if (strcmp(scope, scopes[i].name) == 0) {
@@ -58,9 +58,10 @@ static void answer_reacquire(control *self, client *from, const rpc_request *req
                   "\"scope\" must be \"transport\", \"photometry\", \"geometry\" or \"changed\"");
     return;
   }
-  if (kind == MEASURE_CALIBRATE) {
+  if (kind == MEASURE_GEOMETRY && self->config.station.calibration[0] == '\0') {
     server_refuse(from, request, RPC_FAILED,
-                  "the daemon measures no geometry: run `counterlight calibrate`, then start the daemon again");
+                  "there is no geometry to measure again: without a \"calibration\" every cell is a whole number of "
+                  "the camera's pixels; for a camera that stands elsewhere run `counterlight calibrate` first");
     return;
   }
   control_wishes before = self->wishes;

@@ -1,4 +1,5 @@
 /* What clients are told. */
+#include <math.h>
 #include <stdio.h>
 
 #include "base/file.h"
@@ -81,19 +82,30 @@ json_t *control_drift_note(const control *self) {
                    self->found.drifts);
 }
 
+static json_t *geometry_note(const geometry_renewal *geometry) {
+  if (!geometry->measured) {
+    return json_null();
+  }
+  return json_pack("{s:b, s:o, s:o, s:o}", "adopted", geometry->adopted, "covered",
+                   geometry->adopted ? json_real(geometry->covered) : json_null(), "moved",
+                   geometry->adopted && isfinite(geometry->moved) ? json_real(geometry->moved) : json_null(), "why",
+                   text_or_null(geometry->why));
+}
+
 json_t *control_renewed_note(const control *self) {
-  static const char *const names[] = {[RENEW_NONE] = "",
+  static const char *const names[] = {[RENEW_NONE] = "kept",
                                       [RENEW_FITS] = "nothing",
                                       [RENEW_GAIN] = "gain",
                                       [RENEW_REPAINT] = "repaint",
                                       [RENEW_MEASURE] = "transport"};
   const renewal *renewed = &self->found.renewed;
-  if (renewed->outcome == RENEW_NONE) {
+  if (renewed->outcome == RENEW_NONE && !renewed->geometry.measured) {
     return json_null();
   }
-  return json_pack("{s:s, s:i, s:I, s:f, s:f, s:f, s:b}", "done", names[renewed->outcome], "patterns",
+  return json_pack("{s:s, s:i, s:I, s:f, s:f, s:f, s:b, s:o}", "done", names[renewed->outcome], "patterns",
                    renewed->patterns, "rows", (json_int_t)renewed->rows, "off_before", renewed->before.off, "off_after",
-                   renewed->after.off, "limit", renewed->after.limit, "fits", renewed->after.fits);
+                   renewed->after.off, "limit", renewed->after.limit, "fits", renewed->after.fits, "geometry",
+                   geometry_note(&renewed->geometry));
 }
 
 json_t *control_moving_note(const control *self) {

@@ -1,5 +1,6 @@
 /* The state directory: what survives the end of the daemon.
  *
+ *   calibration.h5 a geometry that was measured again (geometry.c)
  *   transport.h5   the transport in use, replaced only by a complete newer one
  *   content.EXT    the picture that `show` brought, as it came
  *   drive.npy      the last drive

@@ -94,6 +94,15 @@ void control_on_verification(control *self, measure_result *letter) {
   refine_or(self, misfit, changed ? EVENT_CHANGED : EVENT_VERIFIED);
 }
 
+static void tell_geometry(const geometry_renewal *geometry) {
+  if (geometry->adopted) {
+    clt_log(CLT_LOG_NOTICE, "the geometry is new: the camera moved by %.2f of its pixels and sees %.1f %% of the panel",
+            geometry->moved, 100 * geometry->covered);
+  } else if (geometry->measured) {
+    clt_log(CLT_LOG_WARNING, "the earlier geometry stays: %s", geometry->why);
+  }
+}
+
 /* A transport to adopt, or the one in use fits and is solved with again. */
 void control_on_renewal(control *self, const measure_result *letter) {
   static const char *const texts[] = {[RENEW_NONE] = "measured",
@@ -103,8 +112,11 @@ void control_on_renewal(control *self, const measure_result *letter) {
                                       [RENEW_MEASURE] = "all of it was measured"};
   const renewal *renewed = &letter->renewed;
   self->found.renewed = *renewed;
-  clt_log(CLT_LOG_NOTICE, "the transport was %.2f %% off where %.2f %% fits: %s, by %d patterns",
-          100 * renewed->before.off, 100 * renewed->before.limit, texts[renewed->outcome], renewed->patterns);
+  tell_geometry(&renewed->geometry);
+  if (renewed->outcome != RENEW_NONE) {
+    clt_log(CLT_LOG_NOTICE, "the transport was %.2f %% off where %.2f %% fits: %s, by %d patterns",
+            100 * renewed->before.off, 100 * renewed->before.limit, texts[renewed->outcome], renewed->patterns);
+  }
   server_notify(self->service, "reacquired", control_renewed_note(self));
   if (letter->transport == NULL) {
     self->wishes.acquire = false;

@@ -11,8 +11,6 @@
 
 /* Before the latency is known: longer than any projector's and driver's together. */
 #define LATENCY_AT_FIRST_S 0.5
-#define TIMEOUT_S 2.0
-enum { ATTEMPTS = 3 };
 
 /* A calibration under way. */
 typedef struct measuring {
@@ -114,6 +112,21 @@ clt_status clt_calibration_cover(const clt_pixel_map *map, double pitch, double 
   return CLT_OK;
 }
 
+clt_status clt_calibration_take_geometry(clt_calibration *made, clt_geometry *geometry, clt_error *error) {
+  clt_calibration_info *info = &made->info;
+  info->pitch = geometry->decode.pitch;
+  info->decoded = geometry->decode.count[CLT_PIXEL_DECODED];
+  info->calibrated = (int64_t)time(NULL);
+  made->map = geometry->map;
+  geometry->map = (clt_pixel_map){0};
+  if (info->decoded == 0) {
+    return clt_fail(error, CLT_FAILED, "%s",
+                    made->findings.count > 0 ? made->findings.item[made->findings.count - 1].text
+                                             : "no camera pixel was decoded");
+  }
+  return clt_calibration_cover(&made->map, info->pitch, &info->covered, error);
+}
+
 /* Moves what was measured into the calibration. */
 static clt_status conclude(measuring *m, clt_error *error) {
   clt_calibration *made = m->made;
@@ -133,26 +146,16 @@ static clt_status conclude(measuring *m, clt_error *error) {
                                  .exposure_count = photometry->exposure_count,
                                  .latency_s = latency->seconds,
                                  .jitter_s = latency->jitter_s,
-                                 .complete_s = latency->complete_s,
-                                 .pitch = m->geometry.decode.pitch,
-                                 .decoded = m->geometry.decode.count[CLT_PIXEL_DECODED],
-                                 .calibrated = (int64_t)time(NULL)};
+                                 .complete_s = latency->complete_s};
   memcpy(info->black, photometry->black, sizeof info->black);
   memcpy(info->exposures_s, photometry->exposures_s, sizeof info->exposures_s);
-  made->map = m->geometry.map;
-  m->geometry.map = (clt_pixel_map){0};
   made->report->decode = m->geometry.decode;
   made->report->regions = m->geometry.regions;
   made->report->drift = m->geometry.drift;
   made->report->pictures = m->shots.shown;
   made->report->frames = m->shots.frames;
   made->report->retaken = m->shots.retaken;
-  if (info->decoded == 0) {
-    return clt_fail(error, CLT_FAILED, "%s",
-                    made->findings.count > 0 ? made->findings.item[made->findings.count - 1].text
-                                             : "no camera pixel was decoded");
-  }
-  return clt_calibration_cover(&made->map, info->pitch, &info->covered, error);
+  return clt_calibration_take_geometry(made, &m->geometry, error);
 }
 
 static clt_status measure(measuring *m, clt_error *error) {
@@ -175,9 +178,7 @@ clt_status clt_calibrate(clt_projector *projector, clt_camera *camera, const clt
     clt_calibration_destroy(m.made);
     return clt_fail(error, CLT_FAILED, "out of memory for a calibration");
   }
-  clt_shots_init(&m.shots, projector, camera, LATENCY_AT_FIRST_S,
-                 m.options.timeout_s > 0 ? m.options.timeout_s : TIMEOUT_S,
-                 m.options.attempts > 0 ? m.options.attempts : ATTEMPTS);
+  clt_calibration_shots(&m.options, projector, camera, LATENCY_AT_FIRST_S, &m.shots);
   clt_status status = measure(&m, error);
   if (status != CLT_OK) {
     clt_calibration_destroy(m.made);

@@ -26,6 +26,13 @@ struct clt_calibration {
   clt_calibration_report *report; /* NULL where it was loaded */
 };
 
+/* Shots with the options' timeout and attempts, or 2 s and 3. */
+void clt_calibration_shots(const clt_calibrate_options *options, clt_projector *projector, clt_camera *camera,
+                           double latency_s, clt_shots *shots);
+/* Moves the map into the calibration, with pitch, coverage and date. CLT_FAILED where no pixel was decoded, with the
+ * last finding. */
+clt_status clt_calibration_take_geometry(clt_calibration *made, clt_geometry *geometry, clt_error *error);
+
 /* Share of the panel's pixels that some decoded camera pixel sees, each taken as a square of pitch panel pixels. */
 clt_status clt_calibration_cover(const clt_pixel_map *map, double pitch, double *covered, clt_error *error);
 

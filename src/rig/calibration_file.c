@@ -235,21 +235,26 @@ static clt_status check_map(clt_calibration *made, const char *path, clt_error *
   return CLT_OK;
 }
 
-static clt_status read_all(const clt_hdf *hdf, clt_calibration *made, clt_error *error) {
+static clt_status read_head(const clt_hdf *hdf, int64_t *calibrated, clt_error *error) {
   char format[64] = "";
-  double version = 0, calibrated = 0;
-  clt_calibration_info *info = &made->info;
+  double version = 0, seconds = 0;
   clt_status status = clt_hdf_read_text(hdf, "format", format, sizeof format, error);
   status = status == CLT_OK ? clt_hdf_read_number(hdf, "version", &version, error) : status;
   if (status == CLT_OK && (strcmp(format, format_name) != 0 || version > FORMAT_VERSION)) {
     return clt_fail(error, CLT_BAD_INPUT, "%s: the format is \"%s\" version %g, this program reads \"%s\" up to %d",
                     hdf->path, format, version, format_name, FORMAT_VERSION);
   }
+  status = status == CLT_OK ? clt_hdf_read_number(hdf, "calibrated", &seconds, error) : status;
+  *calibrated = seconds >= 0 && seconds <= 0x1p53 ? (int64_t)seconds : 0;
+  return status;
+}
+
+static clt_status read_all(const clt_hdf *hdf, clt_calibration *made, clt_error *error) {
+  clt_calibration_info *info = &made->info;
+  clt_status status = read_head(hdf, &info->calibrated, error);
   for (size_t k = 0; k < NUMBERS && status == CLT_OK; k++) {
     status = read_number(hdf, &numbers[k], info, error);
   }
-  status = status == CLT_OK ? clt_hdf_read_number(hdf, "calibrated", &calibrated, error) : status;
-  info->calibrated = calibrated >= 0 && calibrated <= 0x1p53 ? (int64_t)calibrated : 0;
   status = status == CLT_OK ? clt_hdf_read_text(hdf, "source", info->source, sizeof info->source, error) : status;
   status = status == CLT_OK ? read_curves(hdf, info, error) : status;
   status = status == CLT_OK ? read_exposures(hdf, info, error) : status;
@@ -273,6 +278,16 @@ clt_status clt_calibration_load(const char *path, clt_calibration **out, clt_err
     made = NULL;
   }
   *out = made;
+  return status;
+}
+
+clt_status clt_calibration_date(const char *path, int64_t *calibrated, clt_error *error) {
+  clt_hdf hdf;
+  clt_hdf_session session = clt_hdf_enter();
+  clt_status status = clt_hdf_open(path, &hdf, error);
+  status = status == CLT_OK ? read_head(&hdf, calibrated, error) : status;
+  clt_hdf_close(&hdf);
+  clt_hdf_leave(session);
   return status;
 }
 

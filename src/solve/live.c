@@ -1,5 +1,5 @@
-/* A live solver over the bounded method of the table. */
-#include "counterlight/live.h"
+/* Live solvers: which form serves, and what is told of a frame. */
+#include "solve/live.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -7,16 +7,6 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
-
-struct clt_live {
-  const clt_transport *transport;
-  const clt_certificate *certificate;
-  clt_transport_info info;
-  clt_solve_options options;
-  clt_solver *solver;
-  size_t values; /* channels * cols */
-  double *wanted, *start, *drive;
-};
 
 static clt_status check_options(const clt_live_options *options, const clt_transport_info *info, clt_error *error) {
   if (options != NULL && !(options->target_error >= 0 && options->target_error < 1)) {
@@ -35,6 +25,28 @@ static clt_status check_options(const clt_live_options *options, const clt_trans
   return CLT_OK;
 }
 
+static void measure_white(clt_live *live) {
+  double sum = 0;
+  for (int c = 0; c < live->info.channels; c++) {
+    const clt_channel_certificate *known = clt_certificate_channel(live->certificate, c);
+    sum += known->white * known->white * (double)known->lit;
+  }
+  live->white_norm = sqrt(sum);
+}
+
+/* The hierarchy, where the storage allows one. */
+static clt_status choose_form(clt_live *live, clt_error *error) {
+  static const double LEFT_OUT = 1e-3; /* by a leaf, of a cell's light */
+  clt_status status = CLT_OK;
+  if (strcmp(live->info.storage, "blocks") == 0) {
+    status = clt_transport_create_hierarchy(live->transport, LEFT_OUT, &live->made, error);
+    live->transport = live->made;
+  }
+  live->form =
+      live->made != NULL || strcmp(live->info.storage, "hierarchy") == 0 ? &clt_live_hierarchic : &clt_live_general;
+  return status;
+}
+
 clt_status clt_live_create(const clt_transport *transport, const clt_certificate *certificate,
                            const clt_live_options *options, clt_live **out, clt_error *error) {
   static const double DEFAULT_ERROR = 1e-3;
@@ -45,25 +57,17 @@ clt_status clt_live_create(const clt_transport *transport, const clt_certificate
     return status;
   }
   clt_live *live = clt_alloc(1, sizeof *live);
-  const size_t values = (size_t)info.channels * info.cols;
-  double *vectors = live != NULL ? clt_alloc(values, 3 * sizeof *vectors) : NULL;
-  if (vectors == NULL) {
-    free(live);
-    return clt_fail(error, CLT_FAILED, "no memory for moving pictures of %zu cells", info.cols);
+  if (live == NULL) {
+    return clt_fail(error, CLT_FAILED, "no memory for moving pictures");
   }
-  const bool chosen = options != NULL && options->target_error > 0;
-  *live = (clt_live){.transport = transport,
-                     .certificate = certificate,
-                     .info = info,
-                     .options = {.method = "bounded",
-                                 .tolerance = chosen ? options->target_error : DEFAULT_ERROR,
-                                 .deadline_s = options != NULL ? 1e-3 * options->budget_ms : 0,
-                                 .together = true},
-                     .values = values,
-                     .wanted = vectors,
-                     .start = vectors + values,
-                     .drive = vectors + 2 * values};
-  status = clt_solver_create(transport, certificate, &live->options, &live->solver, error);
+  *live = (clt_live){.transport = transport, .certificate = certificate, .info = info};
+  live->options = options != NULL ? *options : (clt_live_options){0};
+  live->options.target_error = live->options.target_error > 0 ? live->options.target_error : DEFAULT_ERROR;
+  measure_white(live);
+  status = choose_form(live, error);
+  if (status == CLT_OK) {
+    status = live->form->create(live, error);
+  }
   if (status != CLT_OK) {
     clt_live_destroy(live);
     return status;
@@ -74,61 +78,61 @@ clt_status clt_live_create(const clt_transport *transport, const clt_certificate
 
 void clt_live_destroy(clt_live *live) {
   if (live != NULL) {
-    clt_solver_destroy(live->solver);
-    free(live->wanted);
+    if (live->form != NULL) {
+      live->form->destroy(live);
+    }
+    clt_transport_destroy(live->made);
     free(live);
   }
 }
 
-static void tell(const clt_live *live, const clt_solve_result *solve, clt_live_result *result) {
-  size_t lit = 0, clipped = 0;
+double clt_live_size(const clt_live *live, const float *target) {
+  double sum = 0;
   for (int c = 0; c < live->info.channels; c++) {
-    const unsigned char *takes_part = clt_certificate_lit(live->certificate, c);
-    const double *drive = live->drive + (size_t)c * live->info.cols;
-    for (size_t j = 0; j < live->info.cols; j++) {
-      lit += takes_part[j];
-      clipped += takes_part[j] && (drive[j] <= 0 || drive[j] >= 1);
+    const unsigned char *lit = clt_certificate_lit(live->certificate, c);
+    const float *values = target + (size_t)c * live->info.cols;
+    for (size_t i = 0; i < live->info.cols; i++) {
+      sum += lit[i] ? (double)values[i] * (double)values[i] : 0;
     }
   }
-  const double known = fmax(clt_transport_origin(live->transport)->error, 0);
-  *result = (clt_live_result){.error = hypot(solve->residual, known),
-                              .residual = solve->residual,
-                              .clipped_fraction = lit > 0 ? (double)clipped / (double)lit : 0,
-                              .steps = solve->iterations,
-                              .converged = solve->converged};
-  result->ms[CLT_LIVE_SOLVE] = 1e3 * solve->method_seconds;
-  result->ms[CLT_LIVE_ESTIMATE] = 1e3 * (solve->seconds - solve->method_seconds);
+  return sum > 0 ? sqrt(sum) : live->white_norm > 0 ? live->white_norm : 1;
+}
+
+/* What the operator may be off by of what is seen: as its check patterns found it, and what the hierarchy left out. */
+static double operator_error(const clt_live *live) {
+  const double checked = clt_transport_origin(live->transport)->error;
+  return hypot(checked > 0 ? checked : 0, clt_transport_simplified(live->transport));
+}
+
+static clt_status check_target(const clt_live *live, const float *target, clt_error *error) {
+  const size_t values = (size_t)live->info.channels * live->info.cols;
+  float worst = 0;
+  for (size_t at = 0; at < values; at++) {
+    worst += target[at] * 0; /* NaN for one that is not finite */
+  }
+  return worst == 0 ? CLT_OK
+                    : clt_fail(error, CLT_BAD_INPUT, "a target of moving pictures has values that are not finite");
 }
 
 clt_status clt_live_solve(clt_live *live, const float *target, float *drive, clt_live_result *result,
                           clt_error *error) {
-  const int64_t start_ns = clt_clock_ns();
-  for (int c = 0; c < live->info.channels; c++) {
-    const float *black = clt_transport_black(live->transport, c);
-    for (size_t i = 0; i < live->info.cols; i++) {
-      const size_t at = (size_t)c * live->info.cols + i;
-      live->wanted[at] = (double)(target[at] - black[i]);
-    }
-  }
-  clt_solve_result solve = {0};
-  const double prepare_ms = 1e3 * clt_clock_since(start_ns);
-  clt_status status = clt_solver_run(live->solver, live->wanted, live->start, live->drive, &solve, error);
+  live->start_ns = clt_clock_ns();
+  *result = (clt_live_result){0};
+  clt_status status = check_target(live, target, error);
   if (status == CLT_OK) {
-    memcpy(live->start, live->drive, live->values * sizeof *live->drive);
-    tell(live, &solve, result);
-    result->ms[CLT_LIVE_PREPARE] = prepare_ms;
-    result->total_ms = 1e3 * clt_clock_since(start_ns);
+    status = live->form->solve(live, target, drive, result, error);
   }
-  for (size_t at = 0; at < live->values; at++) {
-    drive[at] = (float)live->start[at];
+  if (status == CLT_OK) {
+    result->error = hypot(result->residual, live->seen * operator_error(live));
+    result->total_ms = 1e3 * clt_clock_since(live->start_ns);
   }
   return status;
 }
 
 void clt_live_reset(clt_live *live) {
-  memset(live->start, 0, live->values * sizeof *live->start);
+  live->form->reset(live);
 }
 
 void clt_live_set_budget(clt_live *live, double budget_ms) {
-  live->options.deadline_s = 1e-3 * budget_ms;
+  live->options.budget_ms = budget_ms;
 }

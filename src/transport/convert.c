@@ -36,8 +36,7 @@ static void copy_plane(const clt_transport *from, const float *values, float *ou
   memcpy(out, values, (size_t)from->channels * from->rows * sizeof *out);
 }
 
-/* Black, flood and deviations. */
-static clt_status copy_planes(const clt_transport *from, clt_transport *to, clt_error *error) {
+clt_status clt_transport_copy_planes(const clt_transport *from, clt_transport *to, clt_error *error) {
   clt_status status = clt_transport_keep_black(to, error);
   if (status == CLT_OK) {
     copy_plane(from, from->black, to->black);
@@ -103,7 +102,7 @@ clt_status clt_transport_convert(const clt_transport *transport, const char *sto
   made->provenance = transport->provenance;
   status = kind->reserve(made, error);
   if (status == CLT_OK) {
-    status = copy_planes(transport, made, error);
+    status = clt_transport_copy_planes(transport, made, error);
   }
   if (status == CLT_OK) {
     status = copy_rows(transport, made, error);

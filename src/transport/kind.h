@@ -39,7 +39,7 @@ typedef struct clt_kind {
 enum { CLT_WORTH_SHARING = 32768 }; /* dense entries from which threads pay */
 
 extern const clt_kind clt_kind_dense, clt_kind_dense64, clt_kind_dense16, clt_kind_dense8, clt_kind_tree,
-    clt_kind_blocks;
+    clt_kind_blocks, clt_kind_hierarchy;
 
 /* Every kind, ended by NULL. */
 extern const clt_kind *const clt_kinds[];
@@ -63,5 +63,7 @@ clt_status clt_transport_set_rows(clt_transport *transport, size_t rows, const c
 clt_status clt_transport_too_large(const clt_transport *transport, size_t bytes, clt_error *error);
 /* Makes room for the black, which every transport has; zeros. */
 clt_status clt_transport_keep_black(clt_transport *transport, clt_error *error);
+/* Copies black, flood and deviations. */
+clt_status clt_transport_copy_planes(const clt_transport *from, clt_transport *to, clt_error *error);
 
 #endif

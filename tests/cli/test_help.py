@@ -4,7 +4,7 @@ import sys
 import unittest
 
 PROGRAM = sys.argv[1]
-COMMANDS = ("demo calibrate acquire compensate relight bounces separate repaint inspect tradeoff reproduce simulate scene "
+COMMANDS = ("demo doctor calibrate acquire compensate relight bounces separate repaint inspect tradeoff reproduce simulate scene "
             "status show watch reacquire refine snapshot hold resume reload").split()
 
 

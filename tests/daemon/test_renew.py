@@ -96,7 +96,7 @@ def scopes_that_cannot_be_are_refused():
         run.wait_state("showing")
         with run.client() as client:
             error = client.refused("reacquire", scope="geometry")
-            assert error["code"] == -32000 and "counterlight calibrate" in error["message"], error
+            assert error["code"] == -32000 and "no geometry" in error["message"], error
             for scope in ("everything", 5, None):
                 error = client.refused("reacquire", scope=scope)
                 assert error["code"] == -32602, error

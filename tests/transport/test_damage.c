@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
+#include "smooth.h"
 #include "storages.h"
 
 enum { DAMAGES = 200 };
@@ -148,9 +149,14 @@ static void test_dense8(void **unused) {
   damage(contact_dense8, 5);
 }
 
+static void test_hierarchy(void **unused) {
+  (void)unused;
+  damage(random_hierarchy, 6);
+}
+
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_dense), cmocka_unit_test(test_tree),
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_dense),   cmocka_unit_test(test_tree),
                                      cmocka_unit_test(test_dense64), cmocka_unit_test(test_dense16),
-                                     cmocka_unit_test(test_dense8)};
+                                     cmocka_unit_test(test_dense8),  cmocka_unit_test(test_hierarchy)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -212,6 +212,48 @@ class Accepted(Case):
             with h5py.File(self.path, 'a') as file:
                 file['blocks/' + name][index] = kept
 
+    def test_hierarchy(self):
+        """Random parts over three leaves, against the matrix form in docs/transport-file.md."""
+        random = np.random.default_rng(8)
+        leaf = np.array([[0, 0, 3, 3], [3, 0, 2, 2], [3, 2, 2, 1]])
+        left, right = random.random((C, 12, 2)), random.random((C, 12, 2))
+        scale, gather, own, flood = random.random((4, C, N))
+        start, cell, value = np.minimum(np.arange(N + 1), 5), np.array([3, 3, 0, 14, 7]), random.random((C, 5))
+        parts = {'leaf': leaf, 'left': left, 'right': right, 'scale': scale, 'gather': gather, 'own': own,
+                 'flood': flood, 'start': start, 'cell': cell, 'value': value, 'error': [0.001]}
+        write(self.path, entries())
+        with h5py.File(self.path, 'a') as file:
+            del file['dense']
+            for name, data in parts.items():
+                file['hierarchy/' + name] = data
+        f4 = {name: np.asarray(data).astype('f4').astype(float) for name, data in parts.items()}
+        P = np.zeros((N, 12))
+        for k, (x, y, w, h) in enumerate(leaf):
+            for i in range(w * h):
+                u, v = (2 * (i % w) + 1) / w - 1, (2 * (i // w) + 1) / h - 1
+                P[(y + i // w) * W + x + i % w, 4 * k:4 * k + 4] = 1, u, v, u * v
+        code, answer = show(self.path)
+        self.assertEqual((code, answer['storage']), (0, 'hierarchy'), answer)
+        for c in range(C):
+            T = np.diag(f4['own'][c]) + np.outer(f4['flood'][c], np.full(N, 1 / N))
+            T += f4['scale'][c][:, None] * (P @ f4['left'][c] @ f4['right'][c].T @ P.T) * f4['gather'][c]
+            for i in range(5):
+                T[i, cell[i]] += f4['value'][c, i]
+            np.testing.assert_allclose(answer['forward'][c], T @ (1.0 + np.arange(N)), rtol=1e-10)
+            np.testing.assert_allclose(answer['backward'][c], (1.0 + np.arange(N)) @ T, rtol=1e-10)
+        for name, index, bad in (('leaf', (1, 2), 3), ('leaf', (2, 0), -1), ('leaf', (0, 3), 40), ('left', (0, 1, 1), np.nan),
+                                 ('right', (1, 3, 0), np.inf), ('scale', (0, 2), np.nan), ('gather', (1, 1), np.inf),
+                                 ('own', (0, 0), np.nan), ('flood', (1, 4), np.inf), ('start', 1, 9), ('cell', 0, 15),
+                                 ('value', (0, 1), np.inf), ('error', 0, -1.0)):
+            with h5py.File(self.path, 'a') as file:
+                kept = file['hierarchy/' + name][index]
+                file['hierarchy/' + name][index] = bad
+            code, answer = show(self.path)
+            self.assertEqual(code, 2, (name, answer))
+            self.assertIn('/hierarchy/%s[' % name, answer['message'])
+            with h5py.File(self.path, 'a') as file:
+                file['hierarchy/' + name][index] = kept
+
     def test_tree(self):
         write(self.path, entries())
         with h5py.File(self.path, 'a') as file:

@@ -87,6 +87,7 @@ static const clt_pixel_format formats[] = {
     GREY(C('Y', '1', '2', ' '), 12, false),
     GREY(C('Y', '1', '0', ' '), 10, false),
     GREY(C('G', 'R', 'E', 'Y'), 8, false),
+    FIELDS(C('B', 'G', 'R', 'H'), 6, false, {4, true, {14, 20, 26}, {6, 6, 6}}),
     FIELDS(C('R', 'G', 'B', 'P'), 5, false, {2, false, {11, 5, 0}, {5, 6, 5}}),
     FIELDS(C('R', 'G', 'B', 'R'), 5, false, {2, true, {11, 5, 0}, {5, 6, 5}}),
     FIELDS(C('R', 'G', 'B', 'O'), 5, false, {2, false, {10, 5, 0}, {5, 5, 5}}),

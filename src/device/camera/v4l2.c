@@ -12,7 +12,7 @@
 
 /* After the exposure control was set, frames that begin within so many frames' time may still have the time before:
  * sensors latch a new one for the next frame but one, and it has to get there. */
-#define SETTLE_FRAMES 3
+#define SETTLE_FRAMES 2
 /* Not known of a real camera; a calibration measures them. The read noise, in code values, is too little for two equal
  * pictures to be taken for a fault. */
 #define FULL_WELL 1e4
@@ -124,39 +124,46 @@ static void count_damaged(v4l2_camera *self, const clt_error *error) {
   }
 }
 
+/* Whether the picture is good and begins late enough: then frame has it. Fails for other reasons than damage. */
+static clt_status look_at(v4l2_camera *self, const clt_v4l2_picture *picture, int64_t not_before_ns, clt_frame *frame,
+                          bool *wanted, clt_error *error) {
+  int64_t start = exposed_at(self, picture);
+  self->sequence = self->sequence_before + picture->sequence;
+  *wanted = start >= not_before_ns && start >= self->settled_ns;
+  clt_status status = *wanted || picture->damaged ? read_picture(self, picture, frame, error) : CLT_OK;
+  if (status == CLT_OK) {
+    clt_v4l2_link_good(&self->link);
+  } else if (status == CLT_TIMEOUT) {
+    count_damaged(self, error);
+    *wanted = false;
+    status = CLT_OK;
+  }
+  return status;
+}
+
 /* The first good picture that begins late enough; CLT_TIMEOUT at the limit, or when the camera is stalled. */
 static clt_status await(v4l2_camera *self, int64_t not_before_ns, int64_t limit_ns, clt_frame *frame,
                         clt_error *error) {
   for (;;) {
     clt_v4l2_picture picture;
-    int64_t patience = clt_v4l2_link_patience(&self->link);
-    int64_t until = limit_ns < patience ? limit_ns : patience;
-    clt_status status = clt_v4l2_stream_take(&self->link.node, &self->link.stream, until, &picture, error);
-    if (status != CLT_OK) {
-      return status;
-    }
-    self->sequence = self->sequence_before + picture.sequence;
-    int64_t start = exposed_at(self, &picture);
-    bool wanted = start >= not_before_ns && start >= self->settled_ns;
-    status = wanted || picture.damaged ? read_picture(self, &picture, frame, error) : CLT_OK;
-    if (status == CLT_OK) {
-      clt_v4l2_link_good(&self->link);
-    } else if (status == CLT_TIMEOUT) {
-      count_damaged(self, error);
-    }
     clt_error giving = {0};
-    clt_status given = clt_v4l2_stream_give(&self->link.node, picture.index, &giving);
-    if (status != CLT_OK && status != CLT_TIMEOUT) {
+    bool wanted = false;
+    int64_t patience = clt_v4l2_link_patience(&self->link);
+    clt_status status = clt_v4l2_stream_take(&self->link.node, &self->link.stream,
+                                             limit_ns < patience ? limit_ns : patience, &picture, error);
+    if (status == CLT_OK) {
+      status = look_at(self, &picture, not_before_ns, frame, &wanted, error);
+      clt_status given = clt_v4l2_stream_give(&self->link.node, picture.index, &giving);
+      /* Where the camera went after a picture that is wanted, the next call finds out. */
+      if (status == CLT_OK && !wanted && given != CLT_OK) {
+        return clt_fail(error, CLT_GONE, "%s", giving.message);
+      }
+    }
+    if (status != CLT_OK || wanted) {
       return status;
     }
-    if (status == CLT_OK && wanted) {
-      return CLT_OK; /* where the camera went meanwhile the next call finds out */
-    }
-    if (given != CLT_OK) {
-      *error = giving;
-      return CLT_GONE;
-    }
-    if (clt_clock_ns() >= until) {
+    int64_t now = clt_clock_ns();
+    if (now >= limit_ns || now >= clt_v4l2_link_patience(&self->link)) {
       return clt_fail(error, CLT_TIMEOUT, "%s: no picture of the wanted time and exposure came", self->link.node.path);
     }
   }

@@ -149,7 +149,9 @@ static clt_status read_colours(const clt_v4l2_node *node, const clt_pixel_format
   uint32_t range = pix->quantization != V4L2_QUANTIZATION_DEFAULT
                        ? pix->quantization
                        : (uint32_t)V4L2_MAP_QUANTIZATION_DEFAULT(!format->differences, pix->colorspace, encoding);
-  layout->limited = range == V4L2_QUANTIZATION_LIM_RANGE;
+  /* xvYCC has but one range, whatever the driver says. */
+  layout->limited = range == V4L2_QUANTIZATION_LIM_RANGE ||
+                    (format->differences && (encoding == V4L2_YCBCR_ENC_XV601 || encoding == V4L2_YCBCR_ENC_XV709));
   switch (encoding) {
   case V4L2_YCBCR_ENC_709:
   case V4L2_YCBCR_ENC_XV709:

@@ -1,0 +1,36 @@
+/* A live solver from inside: what every form of it shares, and the forms. */
+#ifndef CLT_SOLVE_LIVE_H
+#define CLT_SOLVE_LIVE_H
+
+#include <stdint.h>
+
+#include "counterlight/live.h"
+
+/* How a frame is solved: with far light of low rank ("hierarchy" storage), or with products of any transport. */
+typedef struct clt_live_form {
+  clt_status (*create)(clt_live *live, clt_error *error);
+  void (*destroy)(clt_live *live); /* accepts half-built ones */
+  void (*reset)(clt_live *live);
+  /* Fills drive and all of result but total_ms and error. */
+  clt_status (*solve)(clt_live *live, const float *target, float *drive, clt_live_result *result, clt_error *error);
+} clt_live_form;
+
+extern const clt_live_form clt_live_hierarchic, clt_live_general;
+
+struct clt_live {
+  const clt_transport *transport;
+  clt_transport *made; /* the hierarchy, where the transport is another storage; NULL where it serves itself */
+  const clt_certificate *certificate;
+  clt_transport_info info;
+  clt_live_options options; /* with the defaults put in */
+  const clt_live_form *form;
+  void *own;         /* the form's */
+  int64_t start_ns;  /* of the frame */
+  double white_norm; /* ||white|| over lit cells of every channel */
+  double seen;       /* ||T drive|| over the same, relative to ||target||: the form's part of the estimate */
+};
+
+/* ||target|| over lit cells of every channel, or ||white|| of a target that is black. */
+double clt_live_size(const clt_live *live, const float *target);
+
+#endif

@@ -1,0 +1,268 @@
+/* Moving pictures: every frame's drive against the bounded optimum that "bounded" finds to many digits, with residuals
+ * computed from the entries of T in double. */
+#include <stdbool.h>
+
+#include "../transport/smooth.h"
+#include "counterlight/live.h"
+#include "solve/live_far.h"
+
+enum { SIDE_X = 40, SIDE_Y = 28, CELLS = SIDE_X * SIDE_Y, CHANNELS = 3, VALUES = CHANNELS * CELLS };
+
+typedef struct bench {
+  smooth_room room;
+  clt_certificate *certificate;
+  clt_live *live;
+} bench;
+
+/* Rooms whose far light is `far` of their near light: from .5 (Jacobi converges) to 4. */
+static bench set_up(double far, double target_error, uint64_t seed) {
+  const size_case size = {SIDE_X, SIDE_Y, CHANNELS, CELLS};
+  uint64_t state = seed;
+  clt_error error = {0};
+  bench made = {.room = make_smooth_room(&size, far, 0, false, &state)};
+  float *black = clt_transport_black(made.room.blocks, 1);
+  for (size_t i = 0; i < CELLS; i++) {
+    black[i] = 0.01f;
+  }
+  clt_transport_provenance(made.room.blocks)->error = 0.001;
+  assert_ok(clt_certify(made.room.blocks, &made.certificate, &error), error);
+  const clt_live_options options = {.target_error = target_error};
+  assert_ok(clt_live_create(made.room.blocks, made.certificate, &options, &made.live, &error), error);
+  return made;
+}
+
+static void tear_down(bench *used) {
+  clt_live_destroy(used->live);
+  clt_certificate_destroy(used->certificate);
+  finish_smooth_room(&used->room);
+}
+
+static double *seen_under(const bench *used, const float *drive) {
+  double *seen = calloc(VALUES, sizeof *seen);
+  for (size_t at = 0; at < VALUES; at++) {
+    const double *row = used->room.entries + at * CELLS;
+    seen[at] = (double)clt_transport_black(used->room.blocks, (int)(at / CELLS))[at % CELLS];
+    for (size_t j = 0; j < CELLS; j++) {
+      seen[at] += row[j] * (double)drive[at / CELLS * CELLS + j];
+    }
+  }
+  return seen;
+}
+
+/* ||y - target|| / ||target||; of black targets relative to white, the median of the diagonal. */
+static double appearance_error(const bench *used, const float *drive, const float *target) {
+  double *seen = seen_under(used, drive), apart = 0, size = 0, white = 0;
+  for (size_t at = 0; at < VALUES; at++) {
+    const double level = clt_certificate_channel(used->certificate, (int)(at / CELLS))->white;
+    apart += (seen[at] - (double)target[at]) * (seen[at] - (double)target[at]);
+    size += (double)target[at] * (double)target[at];
+    white += level * level;
+  }
+  free(seen);
+  return sqrt(apart / (size > 0 ? size : white));
+}
+
+/* The same of the best drive in 0..1. */
+static double best_error(const bench *used, const float *target) {
+  double *wanted = calloc(2 * VALUES, sizeof *wanted), *drive = wanted + VALUES;
+  float *brief = calloc(VALUES, sizeof *brief);
+  const clt_solve_options options = {.method = "bounded", .tolerance = 1e-8, .iteration_limit = 4000};
+  clt_solve_result result;
+  clt_error error = {0};
+  for (size_t at = 0; at < VALUES; at++) {
+    wanted[at] = (double)target[at] - (double)clt_transport_black(used->room.blocks, (int)(at / CELLS))[at % CELLS];
+  }
+  assert_ok(clt_solve(used->room.blocks, used->certificate, wanted, &options, drive, &result, &error), error);
+  for (size_t at = 0; at < VALUES; at++) {
+    brief[at] = (float)drive[at];
+  }
+  const double found = appearance_error(used, brief, target);
+  free(wanted);
+  free(brief);
+  return found;
+}
+
+typedef enum picture { REACHABLE, HALF, CHECKER, SINGLE, BLACK, DIM, PICTURES } picture;
+
+static void draw(const bench *used, picture what, uint64_t seed, float *target) {
+  uint64_t state = seed;
+  float *drive = calloc(VALUES, sizeof *drive);
+  for (size_t at = 0; at < VALUES; at++) {
+    drive[at] = (float)(0.1 + 0.8 * test_random(&state));
+  }
+  double *seen = seen_under(used, drive);
+  for (size_t at = 0; at < VALUES; at++) {
+    const size_t x = at % SIDE_X, y = at % CELLS / SIDE_X;
+    const double plain[PICTURES] = {
+        seen[at], x < SIDE_X / 2 ? 1 : 0, (x / 4 + y / 4) % 2 ? 1.2 : 0, x == 11 && y == 9 ? 1 : 0, 0, 0.05};
+    target[at] = (float)plain[what];
+  }
+  free(seen);
+  free(drive);
+}
+
+static void solve(const bench *used, const float *target, float *drive, clt_live_result *result) {
+  clt_error error = {0};
+  assert_ok(clt_live_solve(used->live, target, drive, result, &error), error);
+  for (size_t at = 0; at < VALUES; at++) {
+    assert_true(drive[at] >= 0 && drive[at] <= 1);
+  }
+}
+
+/* In every room every target comes within target_error of the best that any drive in 0..1 reaches, the residual that is
+ * told is the one that the entries give, and the estimate is no less. */
+static void test_targets(void **unused) {
+  (void)unused;
+  static const double FAR[] = {0.5, 1.5, 4};
+  float *target = calloc(2 * VALUES, sizeof *target), *drive = target + VALUES;
+  for (uint64_t seed = 1; seed <= 3; seed++) {
+    bench used = set_up(FAR[seed - 1], 1e-3, seed);
+    for (picture what = REACHABLE; what < PICTURES; what++) {
+      clt_live_result result;
+      draw(&used, what, seed, target);
+      clt_live_reset(used.live);
+      solve(&used, target, drive, &result);
+      const double error = appearance_error(&used, drive, target), best = best_error(&used, target);
+      assert_true(result.converged);
+      assert_near(result.residual, error, 1e-5 + 1e-4 * error);
+      assert_true(result.error >= result.residual && error <= 1.2 * result.error);
+      assert_true(error <= best + 1e-3);
+      assert_true(what != REACHABLE || error <= 1e-3);
+      assert_true(result.total_ms >= result.ms[CLT_LIVE_SOLVE]);
+    }
+    tear_down(&used);
+  }
+  free(target);
+}
+
+/* A target that comes again changes nothing; one that changes a little takes fewer steps than from nothing. */
+static void test_warm(void **unused) {
+  (void)unused;
+  float *target = calloc(3 * VALUES, sizeof *target), *drive = target + VALUES, *again = target + 2 * VALUES;
+  bench used = set_up(1.5, 1e-4, 7);
+  clt_live_result cold, result;
+  for (picture what = REACHABLE; what < PICTURES; what++) {
+    draw(&used, what, 7, target);
+    solve(&used, target, drive, &result);
+    solve(&used, target, again, &result);
+    assert_int_equal(result.steps, 0);
+    assert_memory_equal(drive, again, VALUES * sizeof *drive);
+  }
+  draw(&used, REACHABLE, 8, target);
+  clt_live_reset(used.live);
+  solve(&used, target, drive, &cold);
+  for (size_t at = 0; at < VALUES; at++) {
+    target[at] *= 1 - 0.03f * (float)(at % SIDE_X) / SIDE_X;
+  }
+  solve(&used, target, drive, &result);
+  assert_true(result.converged && result.steps < cold.steps);
+  assert_true(appearance_error(&used, drive, target) <= 1e-4);
+  free(target);
+  tear_down(&used);
+}
+
+/* A cut from frame to frame ends as a start from nothing does (NUMERICS 8, case 26). */
+static void test_cuts(void **unused) {
+  (void)unused;
+  float *target = calloc(2 * VALUES, sizeof *target), *drive = target + VALUES;
+  bench used = set_up(1.5, 1e-3, 9);
+  clt_live_result result;
+  for (int cut = 0; cut < 24; cut++) {
+    const picture what = (picture)(cut * 5 % PICTURES);
+    draw(&used, what, (uint64_t)cut, target);
+    solve(&used, target, drive, &result);
+    assert_true(result.converged);
+    assert_true(appearance_error(&used, drive, target) <= best_error(&used, target) + 1e-3);
+  }
+  free(target);
+  tear_down(&used);
+}
+
+/* A budget that is over at once leaves a drive whose residual is told, and the next frames go on from it. */
+static void test_budget(void **unused) {
+  (void)unused;
+  float *target = calloc(2 * VALUES, sizeof *target), *drive = target + VALUES;
+  bench used = set_up(1.5, 1e-5, 11);
+  clt_live_result result;
+  draw(&used, HALF, 11, target);
+  clt_live_set_budget(used.live, 1e-6);
+  solve(&used, target, drive, &result);
+  assert_false(result.converged);
+  assert_near(result.residual, appearance_error(&used, drive, target), 1e-4);
+  clt_live_set_budget(used.live, 0);
+  solve(&used, target, drive, &result);
+  assert_true(result.converged);
+  free(target);
+  tear_down(&used);
+}
+
+/* The drive has the same bits whatever the processor can do. */
+static void test_variants(void **unused) {
+  (void)unused;
+  float *target = calloc(3 * VALUES, sizeof *target);
+  for (size_t k = 0; clt_live_variants[k] != NULL; k++) {
+    bench used = set_up(1.5, 1e-4, 13);
+    clt_live_result result;
+    if (clt_live_variants[k]->runs_here()) {
+      ((clt_far *)used.live->own)->kernels = clt_live_variants[k];
+      draw(&used, HALF, 13, target);
+      solve(&used, target, target + (k == 0 ? 1 : 2) * VALUES, &result);
+      assert_true(k == 0 || memcmp(target + VALUES, target + 2 * VALUES, VALUES * sizeof *target) == 0);
+    }
+    tear_down(&used);
+  }
+  free(target);
+}
+
+/* Storage without leaves goes by products: the same drives. */
+static void test_general(void **unused) {
+  (void)unused;
+  float *target = calloc(3 * VALUES, sizeof *target), *drive = target + VALUES, *other = target + 2 * VALUES;
+  bench used = set_up(1.5, 1e-4, 15);
+  clt_transport *dense = NULL;
+  clt_live *live = NULL;
+  clt_error error = {0};
+  clt_live_result result;
+  const clt_live_options options = {.target_error = 1e-6};
+  assert_ok(clt_transport_convert(used.room.blocks, "dense", &dense, &error), error);
+  assert_ok(clt_live_create(dense, used.certificate, &options, &live, &error), error);
+  draw(&used, REACHABLE, 15, target);
+  solve(&used, target, drive, &result);
+  assert_ok(clt_live_solve(live, target, other, &result, &error), error);
+  assert_near(result.residual, appearance_error(&used, other, target), 1e-5);
+  for (size_t at = 0; at < VALUES; at++) {
+    assert_near((double)drive[at], (double)other[at], 2e-3);
+  }
+  clt_live_destroy(live);
+  clt_transport_destroy(dense);
+  tear_down(&used);
+  free(target);
+}
+
+static void test_refusals(void **unused) {
+  (void)unused;
+  float *target = calloc(2 * VALUES, sizeof *target), *drive = target + VALUES;
+  bench used = set_up(0.5, 1e-3, 17);
+  clt_error error = {0};
+  clt_live *live = NULL;
+  clt_live_result result;
+  const clt_live_options bad[] = {
+      {.target_error = -1}, {.target_error = 1}, {.target_error = NAN}, {.budget_ms = -1}, {.budget_ms = NAN}};
+  for (size_t k = 0; k < sizeof bad / sizeof bad[0]; k++) {
+    assert_int_equal(clt_live_create(used.room.blocks, used.certificate, &bad[k], &live, &error), CLT_BAD_INPUT);
+    assert_null(live);
+  }
+  target[7] = NAN;
+  assert_int_equal(clt_live_solve(used.live, target, drive, &result, &error), CLT_BAD_INPUT);
+  clt_live_destroy(NULL);
+  free(target);
+  tear_down(&used);
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_targets),  cmocka_unit_test(test_warm),
+                                     cmocka_unit_test(test_cuts),     cmocka_unit_test(test_budget),
+                                     cmocka_unit_test(test_variants), cmocka_unit_test(test_general),
+                                     cmocka_unit_test(test_refusals)};
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
