@@ -25,9 +25,7 @@ enum { WAITS_FOR_CONTENT = 1, WAITS_FOR_SNAPSHOT = 2, WAITS_FOR_TRADEOFF = 3 };
 typedef struct control_wishes {
   unsigned solver;        /* bit set of solver_kind */
   bool acquire;           /* a new transport is owed, through failures and retries, until it serves */
-  measure_kind scope;     /* of that: MEASURE_PHOTOMETRY, MEASURE_CHANGED, else all of it */
   measure_kind scope;     /* of that: MEASURE_PHOTOMETRY, MEASURE_CHANGED, MEASURE_GEOMETRY, else all of it */
-  bool open;              /* devices to be opened again once `measure` is idle */
   bool refine;            /* asked for, at the next verification */
   bool snapshot;          /* to be written when the picture has been photographed */
   int content_descriptor; /* of SOLVER_CONTENT; -1: the configured picture */

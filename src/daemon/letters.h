@@ -5,9 +5,9 @@
  *   measure   (measure.c)  owns the station's camera and rig (opens them, closes them where the camera is lost); the
  *                          rig projects through a stand-in (standin.c) that hands each pattern to main
  *   solver    (solver.c)   owns the content, the transport with its certificate, and the files of the state directory
+ *                          (calibration.h5 is measure's)
  *   moving    (moving.c)   owns the film that plays (player.c, with a thread that decodes) and makes a moving picture
  *                          of each frame
- *                          (calibration.h5 is measure's)
  *   control   (control.c)  owns the state machine, the control socket, signals, timers and the watchdog; decides what
  *                          the others do and keeps copies of what they found
  *
