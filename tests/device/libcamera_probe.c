@@ -1,9 +1,9 @@
-/* Checks one camera of libcamera in the guest: libcamera_probe DEVICE CHECK [ARGUMENT]. Exit 0 where it holds.
+/* Checks one camera of libcamera in the guest: libcamera_probe DEVICE CHECK[=ARGUMENT]... Exit 0 where all hold.
  *
  *   frames           whole, in order, none from the future
- *   exposure NODE    what is set is what NODE's driver has, and automatic exposure is off
+ *   exposure=NODE    what is set is what NODE's driver has, and automatic exposure is off
  *   cycles           ten of opening, taking and closing leave no descriptor and no thread
- *   unplug PID       ends PID, which must make the camera go, and once only; opening it again finds nothing
+ *   unplug=PID       ends PID, which must make the camera go, and once only; opening it again finds nothing
  *   return           opens it as soon as it is there, and takes a frame */
 #include <dirent.h>
 #include <fcntl.h>
@@ -21,6 +21,7 @@
 #include "device/camera/libcamera.h"
 
 enum { CYCLES = 10, FRAMES = 12 };
+enum { WIDTH = 720, HEIGHT = 480 }; /* vimc takes multiples of 6 */
 #define TIMEOUT_S 10.0
 #define PLUGGED_S 30.0
 
@@ -48,7 +49,8 @@ static int count_entries(const char *folder) {
 }
 
 static clt_status try_open(const char *device, clt_camera **camera, clt_error *error) {
-  clt_camera_config config = {.format = "auto", .gain = -1, .focus = -1, .power_line_hz = -1};
+  clt_camera_config config = {
+      .format = "auto", .width = WIDTH, .height = HEIGHT, .gain = -1, .focus = -1, .power_line_hz = -1};
   snprintf(config.device, sizeof config.device, "%s", device);
   return clt_libcamera_camera_open(&config, camera, error);
 }
@@ -172,22 +174,31 @@ static void check_return(const char *device, const char *unused) {
   camera->driver->close(camera);
 }
 
-int main(int count, char **words) {
-  static const struct {
-    const char *name;
-    void (*run)(const char *device, const char *argument);
-  } checks[] = {{"frames", check_frames},
-                {"exposure", check_exposure},
-                {"cycles", check_cycles},
-                {"unplug", check_unplug},
-                {"return", check_return}};
-  setvbuf(stdout, NULL, _IOLBF, 0);
-  for (size_t k = 0; count > 2 && k < sizeof checks / sizeof checks[0]; k++) {
-    if (strcmp(checks[k].name, words[2]) == 0) {
-      checks[k].run(words[1], count > 3 ? words[3] : "");
-      return 0;
+static const struct {
+  const char *name;
+  void (*run)(const char *device, const char *argument);
+} checks[] = {{"frames", check_frames},
+              {"exposure", check_exposure},
+              {"cycles", check_cycles},
+              {"unplug", check_unplug},
+              {"return", check_return}};
+
+static void run_check(const char *device, const char *word) {
+  size_t length = strcspn(word, "=");
+  for (size_t k = 0; k < sizeof checks / sizeof checks[0]; k++) {
+    if (strlen(checks[k].name) == length && strncmp(checks[k].name, word, length) == 0) {
+      printf("%s, %s: ", device, checks[k].name);
+      checks[k].run(device, word[length] == '=' ? word + length + 1 : "");
+      return;
     }
   }
-  fprintf(stderr, "usage: libcamera_probe DEVICE frames|exposure|cycles|unplug|return [ARGUMENT]\n");
-  return 2;
+  must(false, "there is no check %s", word);
+}
+
+int main(int count, char **words) {
+  setvbuf(stdout, NULL, _IOLBF, 0);
+  for (int k = 2; k < count; k++) {
+    run_check(words[1], words[k]);
+  }
+  return 0;
 }
