@@ -1,7 +1,7 @@
 /* Checks one camera of libcamera in the guest: libcamera_probe DEVICE CHECK[=ARGUMENT]... Exit 0 where all hold.
  *
  *   frames           whole, in order, none from the future
- *   exposure=NODE    what is set is what NODE's driver has, and automatic exposure is off
+ *   exposure=NODE    the first frame after setting has the light of it, NODE's driver has it, automatic exposure is off
  *   cycles           ten of opening, taking and closing leave no descriptor and no thread
  *   unplug=PID       ends PID, which must make the camera go, and once only; opening it again finds nothing
  *   return           opens it as soon as it is there, and takes a frame */
@@ -23,6 +23,9 @@
 enum { CYCLES = 10, FRAMES = 12 };
 enum { WIDTH = 720, HEIGHT = 480 }; /* vimc takes multiples of 6 */
 #define TIMEOUT_S 10.0
+/* The simulated camera sees a radiance of 1 everywhere: so much of full scale in a second, and codes are whole. */
+#define SENSITIVITY 20.0
+#define LIGHT_TOLERANCE 0.003
 #define PLUGGED_S 30.0
 
 static void must(bool holds, const char *format, ...) CLT_PRINTF(2, 3);
@@ -102,6 +105,16 @@ static int read_control(const char *node, unsigned id) {
   return control.value;
 }
 
+/* Of full scale, over all samples. */
+static double mean_of(const clt_frame *frame) {
+  size_t count = (size_t)frame->width * (size_t)frame->height * (size_t)frame->channels;
+  double sum = 0;
+  for (size_t k = 0; k < count; k++) {
+    sum += frame->samples[k];
+  }
+  return sum / (double)count / ((1 << frame->bits) - 1);
+}
+
 static void check_exposure(const char *device, const char *node) {
   static const double asked_s[] = {0.002, 0.0123, 0.0333, 0.0001, 0.01234};
   clt_camera *camera = open_camera(device);
@@ -110,7 +123,10 @@ static void check_exposure(const char *device, const char *node) {
     must(camera->driver->set_exposure(camera, asked_s[k], &error) == CLT_OK, "set: %s", error.message);
     clt_frame frame = take(camera, clt_clock_ns());
     int units = read_control(node, V4L2_CID_EXPOSURE_ABSOLUTE);
-    printf("asked %.6f s, frame %.6f s, driver %d x 100 us\n", asked_s[k], frame.exposure_s, units);
+    printf("asked %.6f s, frame %.6f s, driver %d x 100 us, light %.4f\n", asked_s[k], frame.exposure_s, units,
+           mean_of(&frame));
+    must(fabs(mean_of(&frame) - SENSITIVITY * frame.exposure_s) < LIGHT_TOLERANCE,
+         "the first frame does not have the light of its exposure");
     must(fabs(frame.exposure_s - 1e-4 * units) < 1e-9, "the frame's exposure is not the driver's");
     must(fabs(frame.exposure_s - asked_s[k]) <= 0.5e-4 + 1e-9, "the exposure is not what was asked for");
     must(read_control(node, V4L2_CID_EXPOSURE_AUTO) == V4L2_EXPOSURE_MANUAL, "automatic exposure is on");
