@@ -3,6 +3,8 @@
 
 #ifdef CLT_HAVE_V4L2
 
+#include <ctype.h>
+#include <linux/videodev2.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -10,7 +12,7 @@
 
 /* USB carries so much of its nominal speed at best. */
 #define USB_USABLE 0.8
-/* What a picture of so many pixels needs, at least. */
+/* Less is USB 1. */
 #define SLOW_USB_MBIT_S 480
 
 static json_t *sizes_json(const clt_v4l2_offer *offer) {
@@ -68,8 +70,21 @@ static bool is_meant(const doctor *self, const clt_v4l2_camera *camera) {
   return camera->is_usb && clt_usb_parse(device, &which, NULL) == CLT_OK && clt_usb_matches(&which, &camera->usb);
 }
 
+/* v4l2-ctl's name of a control: "White Balance, Automatic" is white_balance_automatic. */
+static void tool_name(const char *name, char *out, size_t size) {
+  size_t used = 0;
+  for (; *name != '\0' && used + 1 < size; name++) {
+    if (isalnum((unsigned char)*name)) {
+      out[used++] = (char)tolower((unsigned char)*name);
+    } else if (used > 0 && out[used - 1] != '_') {
+      out[used++] = '_';
+    }
+  }
+  out[used] = '\0';
+}
+
 static void find_automatic(doctor *self, const clt_v4l2_camera *camera, const clt_v4l2_setting *setting) {
-  char advice[CLT_MESSAGE_MAX];
+  char advice[CLT_MESSAGE_MAX], name[sizeof setting->name];
   if (!setting->automatic || !setting->on) {
     return;
   }
@@ -78,10 +93,11 @@ static void find_automatic(doctor *self, const clt_v4l2_camera *camera, const cl
                 "%s: \"%s\" is automatic and cannot be switched off", camera->node, setting->name);
     return;
   }
+  tool_name(setting->name, name, sizeof name);
   snprintf(advice, sizeof advice,
-           "to be locked while measuring: the driver v4l2 does so as soon as it opens the camera; another program's "
-           "user: v4l2-ctl -d %s --list-ctrls",
-           camera->node);
+           "must be locked to measure; the driver v4l2 does so as it opens the camera, and by hand: v4l2-ctl -d %s -c "
+           "%s=%d",
+           camera->node, name, setting->id == V4L2_CID_EXPOSURE_AUTO ? V4L2_EXPOSURE_MANUAL : 0);
   doctor_find(self, DOCTOR_NOTE, advice, "%s: \"%s\" is automatic now", camera->node, setting->name);
 }
 

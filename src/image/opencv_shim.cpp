@@ -3,11 +3,8 @@
 #include <climits>
 #include <cstdlib>
 #include <cstring>
-#include <iostream>
-#include <mutex>
 #include <new>
 #include <opencv2/core.hpp>
-#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <vector>
@@ -22,35 +19,10 @@ __attribute__((constructor)) void enable_exr() {
   setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1);
 }
 
-/* While it lives, OpenCV neither logs nor prints: imread reports broken files through the log and, past its level, on
- * std::cerr. Both belong to the whole process, so one call at a time. */
-class Silence {
-public:
-  Silence()
-      : lock_(mutex()), level_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)),
-        buffer_(std::cerr.rdbuf(nullptr)) {
-  }
-  ~Silence() {
-    std::cerr.rdbuf(buffer_);
-    cv::utils::logging::setLogLevel(level_);
-  }
-  Silence(const Silence &) = delete;
-  Silence &operator=(const Silence &) = delete;
-
-private:
-  static std::mutex &mutex() {
-    static std::mutex one;
-    return one;
-  }
-  std::lock_guard<std::mutex> lock_;
-  cv::utils::logging::LogLevel level_;
-  std::streambuf *buffer_;
-};
-
 /* Runs work in silence, with every exception caught. */
 template <typename Work> clt_status guarded(const char *path, const char *what, clt_error *error, Work work) {
   return clt_guarded(path, what, error, [&] {
-    Silence silence;
+    clt_silence silence;
     return work();
   });
 }

@@ -19,11 +19,17 @@ namespace {
 
 constexpr double usual_rate_hz = 25, highest_rate_hz = 1000;
 
-clt_status open_file(clt_video *video, clt_error *error) {
-  if (!video->capture.open(video->path) || !video->capture.read(video->frame) || video->frame.type() != CV_8UC3) {
+// FFmpeg reads what it can; OpenCV's own decoder reads Motion JPEG where it has no FFmpeg.
+bool open_file(clt_video *video) {
+  clt_silence silence;
+  return video->capture.open(video->path, cv::CAP_FFMPEG) || video->capture.open(video->path, cv::CAP_OPENCV_MJPEG);
+}
+
+clt_status open_first(clt_video *video, clt_error *error) {
+  if (!open_file(video) || !video->capture.read(video->frame) || video->frame.type() != CV_8UC3) {
     return clt_fail(error, CLT_BAD_INPUT,
                     "%s: is no video that can be decoded; AVI with Motion JPEG is read everywhere, other kinds where "
-                    "OpenCV has FFmpeg or GStreamer",
+                    "OpenCV has FFmpeg",
                     video->path.c_str());
   }
   return CLT_OK;
@@ -35,7 +41,7 @@ clt_status clt_video_open(const char *path, clt_video **out, clt_video_info *inf
   return clt_guarded(path, "cannot be opened", error, [&] {
     auto video = std::make_unique<clt_video>();
     video->path = path;
-    clt_status status = open_file(video.get(), error);
+    clt_status status = open_first(video.get(), error);
     if (status != CLT_OK) {
       return status;
     }
@@ -71,7 +77,7 @@ clt_status clt_video_read(clt_video *video, const int rectangle[4], uint8_t *cod
 // Not every decoder seeks: the file is opened again.
 clt_status clt_video_rewind(clt_video *video, clt_error *error) {
   return clt_guarded(video->path.c_str(), "cannot be opened again", error, [&] {
-    return video->capture.open(video->path)
+    return open_file(video)
                ? CLT_OK
                : clt_fail(error, CLT_BAD_INPUT, "%s: cannot be opened again; is it there?", video->path.c_str());
   });

@@ -2,6 +2,7 @@
 what the configuration needs makes it fail."""
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -128,6 +129,53 @@ class Doctor(unittest.TestCase):
             if finding["area"] not in ("machine",):
                 self.assertIn(f"  {finding['level']:8} {finding['what']}", lines)
         self.assertEqual(run("-q").stdout, "")
+
+
+class Display(unittest.TestCase):
+    """On an X server of its own, drawn by the processor."""
+
+    def setUp(self):
+        if any("glfw is not in this build" in f["what"] for f in answer()[1]["findings"]):
+            self.skipTest("the driver glfw is not in this build")
+        if shutil.which("Xvfb") is None:
+            self.skipTest("there is no Xvfb")
+        reading, writing = os.pipe()
+        server = subprocess.Popen(["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x800x24", "-nolisten", "tcp"],
+                                  pass_fds=[writing], stderr=subprocess.DEVNULL)
+        self.addCleanup(server.wait)
+        self.addCleanup(server.terminate)
+        os.close(writing)
+        with os.fdopen(reading) as number:
+            self.display = ":" + number.readline().strip()
+
+    def ask(self, text):
+        with tempfile.TemporaryDirectory() as folder:
+            return answer("--config", configuration(folder, text), DISPLAY=self.display, LIBGL_ALWAYS_SOFTWARE="1")
+
+    def test_monitor_and_renderer(self):
+        code, document = self.ask('projector = { driver = "glfw"; };')
+        self.assertEqual((code, of_level(document, "problem")), (0, []))
+        (monitor,) = document["monitors"]
+        self.assertEqual([monitor[k] for k in ("x", "y", "width", "height", "primary", "chosen")],
+                         [0, 0, 1280, 800, True, True])
+        self.assertTrue(document["display"]["software"])
+        said = " ".join(f["what"] for f in of_level(document, "warning", "projector"))
+        self.assertIn("primary", said)
+        self.assertIn(document["display"]["renderer"], said)
+
+    def test_a_monitor_that_is_not_there(self):
+        code, document = self.ask('projector = { driver = "glfw"; monitor = "HDMI-7"; };')
+        self.assertEqual(code, 1)
+        (problem,) = of_level(document, "problem", "projector")
+        self.assertIn("HDMI-7", problem["what"])
+        self.assertIn(document["monitors"][0]["name"], problem["what"])
+        self.assertFalse(document["monitors"][0]["chosen"])
+
+    def test_its_name_is_what_to_write(self):
+        _, document = self.ask("")
+        name = document["monitors"][0]["name"]
+        code, document = self.ask(f'projector = {{ driver = "glfw"; monitor = "{name}"; }};')
+        self.assertEqual((code, document["monitors"][0]["chosen"]), (0, True))
 
 
 if __name__ == "__main__":

@@ -118,9 +118,16 @@ def pictures(width, height, random):
 
 
 def play(path):
-    """A program that puts the picture into the output again and again."""
-    return subprocess.Popen(["v4l2-ctl", "-d", OUTPUT, "--stream-out-mmap", f"--stream-from={path}", "--stream-loop"],
-                            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    """A program that puts the picture into the output again and again. It has begun when it has shown more ">" than it
+    has buffers."""
+    player = subprocess.Popen(["v4l2-ctl", "-d", OUTPUT, "--stream-out-mmap", f"--stream-from={path}", "--stream-loop"],
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    seen = b""
+    while seen.count(b">") < 10:
+        byte = player.stdout.read(1)
+        assert byte, seen
+        seen += byte
+    return player
 
 
 def loop_is_exact(probe):
@@ -133,19 +140,40 @@ def loop_is_exact(probe):
         with open(path, "wb") as out:
             out.write(raw)
         run("v4l2-ctl", "-d", OUTPUT, f"--set-fmt-video-out=pixelformat={code}")
-        info = probe.must_open(CAMERA, code.replace(" ", "_"), width, height)
+        # The camera is opened last: its priority then keeps others from starting any of vivid's streams.
         player = play(path)
-        # The first frames may still be of before the output streams.
-        for _ in range(40):
+        info = probe.must_open(CAMERA, code.replace(" ", "_"), width, height)
+        start = time.monotonic()
+        error = np.inf
+        while error > allowed and time.monotonic() - start < 5:
             frame, _ = probe.frame()
             error = np.abs(frame - wanted).max()
-            if error <= allowed:
-                break
         player.terminate()
         player.wait()
         probe.close()
         assert error <= allowed, f"{code}: {error} codes off, of {info['bits']} bits"
         print(f"{code}: {wanted.size} random samples come out as they went in ({error:.2f} codes)")
+
+
+# vivid's buttons.
+DISCONNECT, DAMAGED_PICTURE, BROKEN_STREAM = 0x00f0f041, 0x00f0f042, 0x00f0f046
+
+
+def faults_are_survived(probe):
+    """A damaged picture is left out, a broken stream is started anew, and a camera that went is opened again."""
+    probe.must_open(CAMERA, "RGB3", 320, 180, 60)
+    _, before = probe.frame()
+    for button in (DAMAGED_PICTURE, BROKEN_STREAM):
+        assert probe.ask(f"press {button}")["status"] == "ok"
+        _, after = probe.frame(before["exposed_ns"] + 1)
+        assert after["sequence"] > before["sequence"], (button, before, after)
+        before = after
+    # vivid is there again as soon as it was closed.
+    probe.ask(f"press {DISCONNECT}")
+    _, after = probe.frame(before["exposed_ns"] + 1)
+    assert after["sequence"] > before["sequence"], (before, after)
+    probe.close()
+    print("damaged picture left out, broken stream started anew, camera opened again that was gone")
 
 
 def main():
@@ -160,6 +188,8 @@ def main():
     bars_in_every_encoding(probe)
     run("v4l2-ctl", "-d", CAMERA, "--set-input=1")
     loop_is_exact(probe)
+    run("v4l2-ctl", "-d", CAMERA, "--set-input=0")
+    faults_are_survived(probe)
     probe.end()
 
 

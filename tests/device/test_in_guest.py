@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-SKIP, NO_ANSWER = 77, 125
+SKIP = 77  # which the runner returns as well, where it finds no kernel
 
 
 def main():
@@ -20,11 +20,8 @@ def main():
         return SKIP
     script = HERE / sys.argv[1]
     command = [sys.executable, "-B", str(script), *(os.path.abspath(a) for a in sys.argv[2:])]
-    done = subprocess.run([*runner, "-t", "240", shlex.join(command)], text=True, stdout=subprocess.PIPE)
+    done = subprocess.run([*runner, "-t", "240", shlex.join(command)], text=True, stdout=subprocess.PIPE, check=False)
     print(done.stdout)
-    if done.returncode in (SKIP, NO_ANSWER):
-        print("skipped: no kernel with cameras answers" if done.returncode == NO_ANSWER else "skipped")
-        return SKIP
     return done.returncode
 
 

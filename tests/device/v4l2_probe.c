@@ -2,12 +2,15 @@
  * object a line on stdout.
  *
  *   open DEVICE FORMAT WIDTH HEIGHT RATE GAIN WHITE FOCUS LINE          (a space in FORMAT is written "_")
- *   expose SECONDS | next NOT_BEFORE_NS TIMEOUT_S [FILE] | close | list | self */
+ *   expose SECONDS | next NOT_BEFORE_NS TIMEOUT_S [FILE] | close | list | self
+ *   press CONTROL                    (the camera's own test buttons, which its priority keeps from other programs) */
 #include <dirent.h>
 #include <inttypes.h>
+#include <linux/videodev2.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include "base/clock.h"
@@ -150,6 +153,19 @@ static void list(void) {
   clt_v4l2_cameras_finish(&cameras);
 }
 
+/* Through the driver's own descriptor. */
+static void press(const char *arguments) {
+  struct v4l2_control control = {.id = (uint32_t)strtoul(arguments, NULL, 10), .value = 1};
+  bool pressed = false;
+  for (int fd = 3; fd < 64 && !pressed; fd++) {
+    char link[32], path[64] = "";
+    snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
+    pressed = readlink(link, path, sizeof path - 1) > 0 && strncmp(path, "/dev/video", 10) == 0 &&
+              ioctl(fd, VIDIOC_S_CTRL, &control) == 0;
+  }
+  printf("{\"status\": \"%s\"}\n", pressed ? "ok" : "failed");
+}
+
 static void expose(const char *arguments, clt_camera *camera) {
   clt_error error = {0};
   clt_status status = camera->driver->set_exposure(camera, strtod(arguments, NULL), &error);
@@ -173,6 +189,8 @@ int main(void) {
       camera->driver->close(camera);
       camera = NULL;
       printf("{\"status\": \"ok\"}\n");
+    } else if (strncmp(line, "press ", 6) == 0) {
+      press(line + 6);
     } else if (strncmp(line, "list", 4) == 0) {
       list();
     } else if (strncmp(line, "self", 4) == 0) {

@@ -216,15 +216,11 @@ static clt_status next(clt_camera *camera, int64_t not_before_ns, double timeout
     }
     drop_ageless(self);
     status = await(self, not_before_ns, limit, frame, &problem);
-    bool stalled = status == CLT_TIMEOUT && clt_clock_ns() >= clt_v4l2_link_patience(&self->link);
-    if (status != CLT_GONE && !stalled) {
+    if ((status != CLT_GONE && status != CLT_TIMEOUT) || clt_clock_ns() >= limit) {
       break;
     }
     if (clt_v4l2_link_treat(&self->link, &problem)) {
       begin_again(self);
-    }
-    if (clt_clock_ns() >= limit) {
-      break;
     }
   }
   if (status != CLT_OK && error != NULL) {

@@ -8,7 +8,7 @@
 
 /* A rate within this part of the one that was asked for is that rate. */
 #define RATE_TOLERANCE 0.02
-enum { RATES_MAX = 256 };
+enum { RATES_MAX = 256, CODES_MAX = 256 };
 
 static double seconds(struct v4l2_fract fraction) {
   return fraction.denominator > 0 ? (double)fraction.numerator / fraction.denominator : 0;
@@ -64,10 +64,22 @@ static bool offers(const clt_v4l2_node *node, uint32_t code, int width, int heig
   return !clt_v4l2_size_at(node, code, 0, &span);
 }
 
-static bool has_code(const clt_v4l2_node *node, uint32_t code) {
+typedef struct codes {
+  int count;
+  uint32_t code[CODES_MAX];
+} codes;
+
+static void read_codes(const clt_v4l2_node *node, codes *offered) {
   struct v4l2_fmtdesc offer = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
-  for (; clt_v4l2_call(node, VIDIOC_ENUM_FMT, &offer) == 0; offer.index++) {
-    if (offer.pixelformat == code) {
+  offered->count = 0;
+  for (; offered->count < CODES_MAX && clt_v4l2_call(node, VIDIOC_ENUM_FMT, &offer) == 0; offer.index++) {
+    offered->code[offered->count++] = offer.pixelformat;
+  }
+}
+
+static bool has_code(const codes *offered, uint32_t code) {
+  for (int k = 0; k < offered->count; k++) {
+    if (offered->code[k] == code) {
       return true;
     }
   }
@@ -83,11 +95,13 @@ static bool better(const clt_pixel_format *format, const clt_pixel_format *best)
 static clt_status choose_format(const clt_v4l2_node *node, const clt_camera_config *config, int width, int height,
                                 const clt_pixel_format **out, clt_error *error) {
   char offered[256] = "", name[5];
+  codes there;
   bool any = config->format[0] == '\0' || strcmp(config->format, "auto") == 0;
   const clt_pixel_format *best = NULL, *format;
+  read_codes(node, &there);
   for (size_t k = 0; (format = clt_pixels_at(k)) != NULL; k++) {
     clt_pixels_name(format->code, name);
-    if (!has_code(node, format->code)) {
+    if (!has_code(&there, format->code)) {
       continue;
     }
     size_t used = strlen(offered);

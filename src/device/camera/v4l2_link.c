@@ -88,10 +88,14 @@ static clt_status reopen(clt_v4l2_link *link, clt_error *error) {
   return status;
 }
 
+static void pause_for(double seconds) {
+  nanosleep(&(struct timespec){0, (long)(seconds * 1e9)}, NULL);
+}
+
 static void wait_for_news(const clt_v4l2_link *link, double seconds) {
   clt_error none;
   if (!link->identity.is_usb || clt_usb_wait(&link->identity.usb, seconds, &none) == CLT_OK) {
-    nanosleep(&(struct timespec){0, (long)((seconds < LOOK_S ? seconds : LOOK_S) * 1e9)}, NULL);
+    pause_for(seconds < LOOK_S ? seconds : LOOK_S);
   }
 }
 
@@ -99,6 +103,7 @@ static void wait_for_news(const clt_v4l2_link *link, double seconds) {
  * soon after the last time. */
 static bool reset(clt_v4l2_link *link) {
   if (!clt_usb_backoff_take(&link->backoff, clt_clock_ns())) {
+    pause_for(LOOK_S);
     return false;
   }
   clt_error why = {0};
@@ -155,7 +160,7 @@ bool clt_v4l2_link_treat(clt_v4l2_link *link, const clt_error *problem) {
     return reset(link);
   }
   clt_error why = {0};
-  clt_log(CLT_LOG_WARNING, "%s: the camera sends nothing: starting its stream anew", link->node.path);
+  clt_log(CLT_LOG_WARNING, "%s; its stream is started anew", problem->message);
   clt_v4l2_stream_stop(&link->node, &link->stream);
   if (start(link, &why) != CLT_OK) {
     clt_log(CLT_LOG_WARNING, "%s", why.message);

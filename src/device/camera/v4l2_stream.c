@@ -108,7 +108,7 @@ clt_status clt_v4l2_stream_take(const clt_v4l2_node *node, const clt_v4l2_stream
       return dequeue(node, stream, picture, error);
     }
     if (left <= 0) {
-      return clt_fail(error, CLT_TIMEOUT, "%s: no picture came in time", node->path);
+      return clt_fail(error, CLT_TIMEOUT, "%s: the camera sends nothing", node->path);
     }
   }
 }
