@@ -50,7 +50,7 @@ static uint32_t frame_end(camera *self) {
 /* The next piece of the frame: two bytes of head (end of frame, error, identity), then samples. */
 static void send_payload(camera *self) {
   uint8_t out[UVC_PAYLOAD];
-  uint32_t left = frame_end(self) - self->sent;
+  uint32_t end = frame_end(self), left = end > self->sent ? end - self->sent : 0; /* a fault may come in between */
   uint32_t bytes = left < UVC_PAYLOAD - UVC_HEADER ? left : UVC_PAYLOAD - UVC_HEADER;
   bool last = bytes == left;
   out[0] = UVC_HEADER;
