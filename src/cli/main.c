@@ -11,7 +11,7 @@ static const cli_command *const commands[] = {
     &cli_command_inspect,   &cli_command_tradeoff,  &cli_command_reproduce, &cli_command_simulate,
     &cli_command_scene,     &cli_command_status,    &cli_command_show,      &cli_command_watch,
     &cli_command_reacquire, &cli_command_refine,    &cli_command_snapshot,  &cli_command_hold,
-    &cli_command_resume,    &cli_command_reload,
+    &cli_command_resume,    &cli_command_reload,    &cli_command_bench,
 };
 enum { COMMANDS = sizeof commands / sizeof *commands };
 
