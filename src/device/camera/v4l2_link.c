@@ -61,6 +61,9 @@ clt_status clt_v4l2_link_open(const clt_camera_config *config, clt_v4l2_link *li
   if (status != CLT_OK) {
     clt_v4l2_link_close(link);
   }
+  if (status == CLT_TIMEOUT && link->identity.is_usb) {
+    clt_usb_reset(&link->port, NULL); /* for who tries again */
+  }
   return status;
 }
 
