@@ -4,8 +4,8 @@ import sys
 import unittest
 
 PROGRAM = sys.argv[1]
-COMMANDS = ("demo doctor calibrate acquire compensate relight bounces separate repaint inspect tradeoff reproduce simulate scene "
-            "status show watch reacquire refine snapshot hold resume reload").split()
+COMMANDS = ("demo doctor calibrate acquire compensate relight bounces separate repaint inspect tradeoff reproduce bench simulate "
+            "scene status show watch reacquire refine snapshot hold resume reload").split()
 
 
 def run(*words):
