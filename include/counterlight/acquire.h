@@ -36,10 +36,15 @@ typedef struct clt_acquire_options {
                         ones as long as the same patterns are asked for. It stays: remove it when the transport is
                         stored, or the next acquisition gives that one again. CLT_BAD_INPUT where it is another rig's */
   int watch;         /* patterns between two looks at the white picture, 0..1000000: where it is not as it was, what was
-                        observed since the last look is observed again once it is. Also waits for a device that is gone or gives
-                        no frame. 0: looks never and waits for nothing */
+                        observed since the last look is observed again once it is; all cells of a channel brighter or darker by
+                        one factor are a lamp, by which observations are divided. A look follows at once where exposures of one
+                        pattern contradict each other. Also waits for a device that is gone or gives no frame. 0: looks never
+                        and waits for nothing; -1: every 25 patterns, where what that keeps in a temporary file is less than
+                        256 MiB */
+  double watch_s;    /* seconds of the devices' time after which a look is due as well; 0: patterns alone count */
   double patience_s; /* to wait for either, >= 0; 0 means 30. Then CLT_FAILED says where the room changed and by how
                         much, or the rig's own status says what is missing */
+  bool recorded;     /* the devices are a recording: where it ends they are not waited for */
   /* Called after every pattern, and with phase "waiting" while a device is waited for; returning false cancels
    * (CLT_CANCELLED). May be NULL. */
   bool (*progress)(void *context, const clt_progress *progress);

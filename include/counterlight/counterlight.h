@@ -5,6 +5,7 @@
 
 #include "counterlight/acquire.h"
 #include "counterlight/analysis.h"
+#include "counterlight/bench.h"
 #include "counterlight/calibration.h"
 #include "counterlight/device.h"
 #include "counterlight/forward.h"

@@ -39,6 +39,8 @@ typedef struct clt_frames_result {
   double scale, offset;         /* of the target */
   bool cut;                     /* another scene begins: scale and offset follow eight times as fast for a while */
   bool settled;                 /* the same content again would give the same */
+  bool direct;                  /* the budget left no time for a step: since the last frame that had one the drive
+                                 * follows the picture by its direct light only, x += (target - target of then) / F */
   double ms[CLT_FRAMES_STAGES]; /* wall time of each stage */
 } clt_frames_result;
 

@@ -19,6 +19,8 @@ typedef struct clt_rig_info {
   const char *response;        /* the projector's response curve as clt_curve_parse reads it */
   const char *source;          /* what is observed, in words: the scene or the devices */
   long patterns, frames;       /* shown and used since the rig was opened */
+  long doubted;                /* patterns whose exposures contradicted each other at first */
+  double seconds;              /* on the devices' clock, when the last frame began */
 } clt_rig_info;
 
 typedef struct clt_rig_operations {

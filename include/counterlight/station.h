@@ -28,7 +28,7 @@ typedef struct clt_station_config {
   bool projector_response_given, camera_response_given; /* rig.projector, rig.camera come from the file */
   bool verify_given;                                    /* and rig.verify; if not, it is true without a calibration */
   char scheme[24];             /* of the acquisition: "auto", "brute", "hadamard", "hierarchical", "blocks" */
-  clt_acquire_options acquire; /* scheme, progress and context are left to the caller */
+  clt_acquire_options acquire; /* scheme, progress and context are left to the caller; watch -1 where nothing is said */
 } clt_station_config;
 
 /* The settings that fit a scene file alone: simulated devices and the rig that suits them. */

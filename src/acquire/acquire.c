@@ -15,7 +15,9 @@
 #define THRESHOLD_MAX 0.5
 #define ERROR_DEFAULT 0.005
 #define ERROR_MAX 0.5
-enum { CHECKS_MAX = 64, WATCH_MAX = 1000000 };
+enum { CHECKS_MAX = 64, WATCH_MAX = 1000000, WATCH_DEFAULT = 25 };
+/* What the watch may keep where nobody asked for it, bytes. */
+#define WATCH_KEEPS_MOST 0x1p28
 
 static clt_status check_options(const clt_acquire_options *options, clt_acquire_options *checked, clt_error *error) {
   *checked = *options;
@@ -36,10 +38,10 @@ static clt_status check_options(const clt_acquire_options *options, clt_acquire_
         "or more",
         options->error, options->seconds, ERROR_MAX);
   }
-  if (options->watch < 0 || options->watch > WATCH_MAX || !(options->patience_s >= 0)) {
+  if (options->watch < -1 || options->watch > WATCH_MAX || !(options->watch_s >= 0) || !(options->patience_s >= 0)) {
     return clt_fail(error, CLT_BAD_INPUT,
-                    "watch is %d, patience %g s; legal is 0 (off) to %d, and 0 (the default) or more", options->watch,
-                    options->patience_s, WATCH_MAX);
+                    "watch is %d, and %g s, patience %g s; legal is -1 (by itself), 0 (off) to %d, and 0 or more",
+                    options->watch, options->watch_s, options->patience_s, WATCH_MAX);
   }
   checked->error = options->error > 0 ? options->error : ERROR_DEFAULT;
   checked->threshold = options->threshold > 0 ? options->threshold : THRESHOLD_DEFAULT;
@@ -124,6 +126,13 @@ static clt_status measure(clt_session *session, const clt_scheme *scheme, clt_tr
   }
 }
 
+/* Every so many patterns, unless what would have to be kept for that is large: two values a cell and channel each. */
+static int watch_by_itself(const clt_session *session, const clt_scheme *scheme) {
+  double patterns = 2.0 * session->options.repeats + (double)scheme->patterns(session);
+  double bytes = 2.0 * sizeof(float) * (double)session->cells * session->info.channels * patterns;
+  return bytes <= WATCH_KEEPS_MOST ? WATCH_DEFAULT : 0;
+}
+
 static clt_status acquire(clt_session *session, const clt_scheme *scheme, clt_transport **out, clt_error *error) {
   const clt_acquire_options *options = &session->options;
   session->progress.total =
@@ -161,6 +170,10 @@ clt_status clt_acquire(clt_rig *rig, const clt_acquire_options *options, clt_tra
   }
   if (status == CLT_OK) {
     session.options.repeats = checked.repeats > 0 ? checked.repeats : scheme->repeats(session.cells);
+    session.options.watch = checked.watch < 0 ? watch_by_itself(&session, scheme) : checked.watch;
+    status = clt_session_begin_watch(&session, error);
+  }
+  if (status == CLT_OK) {
     status = acquire(&session, scheme, out, error);
   }
   clt_session_finish(&session);

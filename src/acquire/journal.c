@@ -157,6 +157,17 @@ clt_status clt_journal_replay(clt_journal *journal, const clt_image *drive, clt_
              : fail(journal, "could not continue", error);
 }
 
+bool clt_journal_is_replaying(const clt_journal *journal) {
+  return journal->file >= 0 && journal->replaying;
+}
+
+bool clt_journal_next_is(const clt_journal *journal, const clt_image *drive) {
+  record next;
+  const off_t here = lseek(journal->file, 0, SEEK_CUR);
+  return here >= 0 && pread(journal->file, &next, sizeof next, here) == (ssize_t)sizeof next &&
+         next.drive == hash_image(HASH_START, drive);
+}
+
 clt_status clt_journal_add(clt_journal *journal, const clt_image *drive, const clt_image *seen,
                            const clt_image *deviation, clt_error *error) {
   if (journal->file < 0) {

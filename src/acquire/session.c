@@ -30,11 +30,14 @@ clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquir
   for (size_t i = 0; status == CLT_OK && i < sizeof images / sizeof images[0]; i++) {
     status = clt_image_init(images[i], info->channels, info->height, info->width, error);
   }
-  status = status == CLT_OK ? clt_watch_init(&session->watch, options, info, error) : status;
-  if (status == CLT_OK && options->journal == NULL && options->watch > 0) {
-    return clt_journal_open_unnamed(&session->journal, error);
-  }
   return status == CLT_OK ? clt_journal_open(&session->journal, options->journal, info, error) : status;
+}
+
+clt_status clt_session_begin_watch(clt_session *session, clt_error *error) {
+  clt_status status = clt_watch_init(&session->watch, &session->options, &session->info, error);
+  return status == CLT_OK && session->options.journal == NULL && session->watch.every > 0
+             ? clt_journal_open_unnamed(&session->journal, error)
+             : status;
 }
 
 void clt_session_finish(clt_session *session) {
@@ -90,7 +93,8 @@ static clt_status observe_patiently(clt_session *session, clt_error *error) {
   double pause_s = PAUSE_FIRST_S;
   for (int tries = 1;; tries++) {
     clt_status status = observe_possible(session, error);
-    if (watch->every == 0 || (status != CLT_TIMEOUT && status != CLT_GONE)) {
+    bool over = status == CLT_GONE && session->options.recorded;
+    if (watch->every == 0 || over || (status != CLT_TIMEOUT && status != CLT_GONE)) {
       return status;
     }
     watch->troubled = true;
@@ -119,6 +123,16 @@ static clt_status observe(clt_session *session, clt_error *error) {
   return status == CLT_OK ? clt_journal_add(&session->journal, drive, seen, deviation, error) : status;
 }
 
+/* Exposures that contradict each other may have seen something move: a look is due. */
+static void note_doubt(clt_session *session) {
+  clt_watch *watch = &session->watch;
+  clt_rig_info now;
+  session->rig->operations->describe(session->rig, &now);
+  watch->since = now.doubted > watch->doubted ? watch->every : watch->since;
+  watch->doubted = now.doubted;
+  watch->now_s = now.seconds;
+}
+
 /* Observes and counts the drive. */
 static clt_status observe_one(clt_session *session, const char *phase, clt_error *error) {
   clt_progress *progress = &session->progress;
@@ -129,6 +143,7 @@ static clt_status observe_one(clt_session *session, const char *phase, clt_error
   if (status != CLT_OK) {
     return clt_fail_within(error, "acquiring (%s, pattern %ld): ", phase, progress->done + 1);
   }
+  note_doubt(session);
   progress->done++;
   progress->total = progress->done > progress->total ? progress->done : progress->total;
   progress->seconds = clt_clock_since(session->started_ns);
@@ -136,14 +151,26 @@ static clt_status observe_one(clt_session *session, const char *phase, clt_error
   return report(session, phase, error);
 }
 
+/* By patterns, by time, after a doubt; while the journal is replayed, where one was made. */
+static bool look_is_due(clt_session *session) {
+  const clt_watch *watch = &session->watch;
+  if (!watch->ready || watch->since == 0) {
+    return false;
+  }
+  return clt_journal_is_replaying(&session->journal)
+             ? clt_journal_next_is(&session->journal, &watch->white)
+             : watch->since >= watch->every || (watch->every_s > 0 && watch->now_s - watch->good_s >= watch->every_s);
+}
+
 clt_status clt_session_observe(clt_session *session, const char *phase, clt_error *error) {
   clt_watch *watch = &session->watch;
-  clt_status status = CLT_OK;
-  if (watch->ready && watch->since >= watch->every) {
-    status = clt_session_look(session, error);
-  }
+  clt_status status = look_is_due(session) ? clt_session_look(session, error) : CLT_OK;
   watch->since++;
-  return status == CLT_OK ? observe_one(session, phase, error) : status;
+  status = status == CLT_OK ? observe_one(session, phase, error) : status;
+  if (status == CLT_OK && watch->every > 0) {
+    clt_watch_correct(watch, &session->black, &session->seen, &session->deviation);
+  }
+  return status;
 }
 
 void clt_session_mark_start(clt_session *session) {
@@ -157,6 +184,7 @@ static void mark_good(clt_session *session) {
   watch->good = clt_journal_here(&session->journal);
   watch->good_done = session->progress.done;
   watch->since = 0;
+  watch->good_s = watch->now_s;
   watch->troubled = false;
 }
 
@@ -183,6 +211,7 @@ clt_status clt_session_begin_again(clt_session *session, bool *again, clt_error 
   watch->dropped += session->progress.done - watch->good_done;
   session->progress.done = watch->start_done;
   watch->again = watch->ready = false;
+  clt_watch_forget_lamp(watch);
   return clt_journal_go_back(&session->journal, watch->start, watch->good, error);
 }
 
@@ -198,7 +227,7 @@ static clt_status fail_changed(const clt_session *session, const clt_change *cha
 
 /* Looks until white is what it was. */
 static clt_status look_until_same(clt_session *session, int *looks, clt_error *error) {
-  const clt_watch *watch = &session->watch;
+  clt_watch *watch = &session->watch;
   const int64_t started_ns = clt_clock_ns();
   clt_session_fill(session, 1);
   for (*looks = 1;; ++*looks) {
@@ -206,8 +235,7 @@ static clt_status look_until_same(clt_session *session, int *looks, clt_error *e
     if (status != CLT_OK) {
       return status;
     }
-    clt_change change =
-        clt_watch_compare(&watch->expected, &watch->variance, &session->seen, &session->deviation, STEADY);
+    clt_change change = clt_watch_compare_lamp(watch, &session->black, &session->seen, &session->deviation, STEADY);
     if (!(change.share > 0)) {
       return CLT_OK;
     }

@@ -36,6 +36,8 @@ enum { CLT_REPEATS_DEFAULT = 8, CLT_REPEATS_MAX = 256 };
 extern const clt_scheme clt_scheme_brute, clt_scheme_hadamard, clt_scheme_hierarchical, clt_scheme_blocks;
 
 clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquire_options *options, clt_error *error);
+/* Makes the watch by the options, and a journal without a name for it where there is none with one. */
+clt_status clt_session_begin_watch(clt_session *session, clt_error *error);
 void clt_session_finish(clt_session *session); /* accepts a half-built one */
 
 /* The next pattern is the first of black, flood and the scheme: the place from which to begin again. */

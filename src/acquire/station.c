@@ -6,6 +6,7 @@
 #include "counterlight/replay.h"
 #include "device/camera/libcamera.h"
 #include "device/camera/v4l2.h"
+#include "device/projector/glfw.h"
 
 /* Where neither the file nor a scene says. */
 #define TIMEOUT_S 2.0
@@ -41,6 +42,14 @@ static clt_status open_simulated_camera(const clt_camera_config *config, clt_sce
   return status == CLT_OK ? clt_scene_open_camera(scene, out, error) : status;
 }
 
+#ifdef CLT_HAVE_GLFW
+static clt_status open_glfw_projector(const clt_projector_config *config, clt_scene *scene, clt_projector **out,
+                                      clt_error *error) {
+  (void)scene;
+  return clt_glfw_open_projector(config, out, error);
+}
+#endif
+
 #ifdef CLT_HAVE_V4L2
 static clt_status open_v4l2_camera(const clt_camera_config *config, clt_scene *scene, clt_camera **out,
                                    clt_error *error) {
@@ -59,6 +68,9 @@ static clt_status open_libcamera_camera(const clt_camera_config *config, clt_sce
 
 static const driver_entry drivers[] = {
     {"simulated", open_simulated_projector, open_simulated_camera},
+#ifdef CLT_HAVE_GLFW
+    {"glfw", open_glfw_projector, NULL},
+#endif
 #ifdef CLT_HAVE_V4L2
     {"v4l2", NULL, open_v4l2_camera},
 #endif

@@ -65,7 +65,9 @@ static void read_acquire(clt_section section, clt_station_config *config) {
   acquire->seconds = clt_read_number(section, "seconds", 0, 0, 1e9);
   acquire->repeats = clt_read_integer(section, "repeats", 0, 1, 256);
   acquire->checks = clt_read_integer(section, "checks", 2, 0, 64);
-  acquire->watch = clt_read_integer(section, "watch", 0, 0, 1000000);
+  acquire->watch = clt_read_integer(section, "watch", -1, 0, 1000000);
+  acquire->watch_s = clt_read_number(section, "watch_s", 0, 0, 1e6);
+  acquire->patience_s = clt_read_number(section, "patience_s", 0, 0, 1e6);
   acquire->seed = (unsigned)clt_read_integer(section, "seed", 0, 0, 1000000000);
 }
 
@@ -115,6 +117,7 @@ clt_status clt_station_read(const char *path, clt_station_config *config, clt_er
 clt_status clt_station_for_scene(const char *scene_path, clt_station_config *config, clt_error *error) {
   set_defaults(config);
   config->acquire.checks = 2;
+  config->acquire.watch = -1;
   if (strlen(scene_path) >= sizeof config->scene) {
     return clt_fail(error, CLT_BAD_INPUT, "%.80s...: the path is longer than %d characters", scene_path,
                     CLT_PATH_MAX - 1);

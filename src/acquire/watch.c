@@ -1,26 +1,38 @@
 #include "acquire/watch.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 
+#include "base/order.h"
+
+/* How far a lamp drifts; more is another light. */
+#define LAMP_MOST 0.1
 #define PATIENCE_DEFAULT_S 30.0
 #define DEVIATIONS 6.0
 enum { TILES = 16 };
 
 clt_status clt_watch_init(clt_watch *watch, const clt_acquire_options *options, const clt_rig_info *info,
                           clt_error *error) {
-  *watch = (clt_watch){.every = options->watch,
+  *watch = (clt_watch){.every = options->watch == 0 && options->watch_s > 0 ? INT_MAX : options->watch,
+                       .every_s = options->watch_s,
+                       .doubted = info->doubted,
                        .patience_s = options->patience_s > 0 ? options->patience_s : PATIENCE_DEFAULT_S};
-  clt_image *const images[] = {&watch->drive, &watch->expected, &watch->variance};
+  clt_image *const images[] = {&watch->drive, &watch->white, &watch->expected, &watch->variance};
   clt_status status = CLT_OK;
   for (size_t i = 0; watch->every > 0 && status == CLT_OK && i < sizeof images / sizeof images[0]; i++) {
     status = clt_image_init(images[i], info->channels, info->height, info->width, error);
   }
+  for (size_t k = 0; watch->every > 0 && status == CLT_OK && k < clt_image_size(&watch->white); k++) {
+    watch->white.data[k] = 1;
+  }
+  clt_watch_forget_lamp(watch);
   return status;
 }
 
 void clt_watch_finish(clt_watch *watch) {
   clt_image_finish(&watch->drive);
+  clt_image_finish(&watch->white);
   clt_image_finish(&watch->expected);
   clt_image_finish(&watch->variance);
 }
@@ -28,17 +40,18 @@ void clt_watch_finish(clt_watch *watch) {
 /* Sums of the tile's cells from (x0, y0) up to (x1, y1). */
 typedef struct tile {
   int channel, x0, y0, x1, y1;
-  double light, difference, noise; /* noise is a variance */
+  double light, dark, difference, noise; /* dark is of black; noise is a variance */
 } tile;
 
-static void sum_tile(tile *t, const clt_image *expected, const clt_image *variance, const clt_image *seen,
-                     const clt_image *deviation) {
+static void sum_tile(tile *t, const clt_image *expected, const clt_image *variance, const clt_image *black,
+                     const clt_image *seen, const clt_image *deviation) {
   for (int y = t->y0; y < t->y1; y++) {
     for (int x = t->x0; x < t->x1; x++) {
       size_t at = ((size_t)t->channel * (size_t)seen->height + (size_t)y) * (size_t)seen->width + (size_t)x;
       double own = (double)deviation->data[at], noise = own * own + (double)variance->data[at];
       if (isfinite(noise)) {
         t->light += (double)expected->data[at];
+        t->dark += black != NULL ? (double)black->data[at] : 0;
         t->difference += (double)seen->data[at] - (double)expected->data[at];
         t->noise += noise;
       }
@@ -46,31 +59,95 @@ static void sum_tile(tile *t, const clt_image *expected, const clt_image *varian
   }
 }
 
-clt_change clt_watch_compare(const clt_image *expected, const clt_image *variance, const clt_image *seen,
-                             const clt_image *deviation, double tolerance) {
-  int wide = seen->width < TILES ? seen->width : TILES, high = seen->height < TILES ? seen->height : TILES;
-  int count = wide * high * seen->channels, changed = 0;
+/* The k-th of the tiles, wide x high of them a channel. */
+static tile place_tile(const clt_image *image, int k) {
+  int wide = image->width < TILES ? image->width : TILES, high = image->height < TILES ? image->height : TILES;
+  int u = k % wide, v = k / wide % high;
+  return (tile){.channel = k / (wide * high),
+                .x0 = u * image->width / wide,
+                .y0 = v * image->height / high,
+                .x1 = (u + 1) * image->width / wide,
+                .y1 = (v + 1) * image->height / high};
+}
+
+static int count_tiles(const clt_image *image) {
+  return (image->width < TILES ? image->width : TILES) * (image->height < TILES ? image->height : TILES);
+}
+
+/* By factors lamp of what is above black; black NULL: by none. */
+static clt_change compare(const clt_image *expected, const clt_image *variance, const clt_image *black,
+                          const double *lamp, const clt_image *seen, const clt_image *deviation, double tolerance) {
+  int count = count_tiles(seen) * seen->channels, changed = 0;
   double most = 0;
   clt_change change = {0};
   for (int k = 0; k < count; k++) {
-    int u = k % wide, v = k / wide % high;
-    tile t = {.channel = k / (wide * high),
-              .x0 = u * seen->width / wide,
-              .y0 = v * seen->height / high,
-              .x1 = (u + 1) * seen->width / wide,
-              .y1 = (v + 1) * seen->height / high};
-    sum_tile(&t, expected, variance, seen, deviation);
-    double allowed = DEVIATIONS * sqrt(t.noise) + tolerance * fabs(t.light);
-    changed += fabs(t.difference) > allowed;
-    if (fabs(t.difference) > allowed && fabs(t.difference) - allowed > most) {
-      most = fabs(t.difference) - allowed;
+    tile t = place_tile(seen, k);
+    sum_tile(&t, expected, variance, black, seen, deviation);
+    double brighter = black != NULL ? (lamp[t.channel] - 1) * (t.light - t.dark) : 0;
+    double apart = t.difference - brighter, allowed = DEVIATIONS * sqrt(t.noise) + tolerance * fabs(t.light);
+    changed += fabs(apart) > allowed;
+    if (fabs(apart) > allowed && fabs(apart) - allowed > most) {
+      most = fabs(apart) - allowed;
       change.x = (t.x0 + t.x1) / 2;
       change.y = (t.y0 + t.y1) / 2;
-      change.percent = 100 * t.difference / fmax(fabs(t.light), 1e-3 * fabs(t.difference));
+      change.percent = 100 * apart / fmax(fabs(t.light), 1e-3 * fabs(apart));
     }
   }
   change.share = (double)changed / count;
   return change;
+}
+
+clt_change clt_watch_compare(const clt_image *expected, const clt_image *variance, const clt_image *seen,
+                             const clt_image *deviation, double tolerance) {
+  return compare(expected, variance, NULL, NULL, seen, deviation, tolerance);
+}
+
+/* The median over a channel's tiles of how much brighter they are; 1 where that is no lamp. */
+static double find_lamp(const clt_watch *watch, const clt_image *black, const clt_image *seen,
+                        const clt_image *deviation, int channel) {
+  double ratio[TILES * TILES];
+  size_t count = 0;
+  for (int k = 0; k < count_tiles(seen); k++) {
+    tile t = place_tile(seen, channel * count_tiles(seen) + k);
+    sum_tile(&t, &watch->expected, &watch->variance, black, seen, deviation);
+    double light = t.light - t.dark;
+    if (light > DEVIATIONS * sqrt(t.noise)) {
+      ratio[count++] = 1 + t.difference / light;
+    }
+  }
+  clt_sort_doubles(ratio, count);
+  double lamp = count > 0 ? ratio[count / 2] : 1;
+  return fabs(lamp - 1) <= LAMP_MOST ? lamp : 1;
+}
+
+clt_change clt_watch_compare_lamp(clt_watch *watch, const clt_image *black, const clt_image *seen,
+                                  const clt_image *deviation, double tolerance) {
+  double lamp[CLT_CHANNELS_MAX];
+  for (int c = 0; c < seen->channels; c++) {
+    lamp[c] = find_lamp(watch, black, seen, deviation, c);
+  }
+  clt_change change = compare(&watch->expected, &watch->variance, black, lamp, seen, deviation, tolerance);
+  for (int c = 0; c < seen->channels && !(change.share > 0); c++) {
+    watch->lamp[c] = lamp[c];
+  }
+  return change;
+}
+
+void clt_watch_correct(const clt_watch *watch, const clt_image *black, clt_image *seen, clt_image *deviation) {
+  size_t cells = (size_t)seen->width * (size_t)seen->height;
+  for (size_t k = 0; k < clt_image_size(seen); k++) {
+    double lamp = watch->lamp[k / cells], dark = (double)black->data[k];
+    if (lamp != 1) {
+      seen->data[k] = (float)(dark + ((double)seen->data[k] - dark) / lamp);
+      deviation->data[k] = (float)((double)deviation->data[k] / lamp);
+    }
+  }
+}
+
+void clt_watch_forget_lamp(clt_watch *watch) {
+  for (int c = 0; c < CLT_CHANNELS_MAX; c++) {
+    watch->lamp[c] = 1;
+  }
 }
 
 double clt_watch_impossible(const clt_image *white, const clt_image *variance, const clt_image *seen,

@@ -27,8 +27,13 @@ double clt_watch_impossible(const clt_image *white, const clt_image *variance, c
                             const clt_image *deviation, double tolerance);
 
 typedef struct clt_watch {
-  int every; /* patterns between two looks; 0: none */
+  int every;      /* patterns between two looks; 0: none */
+  double every_s; /* of the devices' time between two looks; 0: it does not count */
   double patience_s;
+  double now_s, good_s;                /* the devices' time of the last pattern and of the last good look */
+  long doubted;                        /* clt_rig_info.doubted at the last pattern */
+  clt_image white;                     /* the drive of a look */
+  double lamp[CLT_CHANNELS_MAX];       /* light of the last good look over what was expected, black aside */
   bool ready;                          /* what is expected is known */
   int since;                           /* patterns since the last good look */
   clt_image drive, expected, variance; /* the pattern that waits during a look; white, black included */
@@ -45,6 +50,16 @@ typedef struct clt_watch {
 clt_status clt_watch_init(clt_watch *watch, const clt_acquire_options *options, const clt_rig_info *info,
                           clt_error *error);
 void clt_watch_finish(clt_watch *watch);
+
+/* As clt_watch_compare against what the watch expects, after the lamp is taken out: in each channel one factor, the
+ * median over tiles of (seen - black) / (expected - black), which may be 0.9..1.1. Where nothing else changed the
+ * factor is kept in watch->lamp. */
+clt_change clt_watch_compare_lamp(clt_watch *watch, const clt_image *black, const clt_image *seen,
+                                  const clt_image *deviation, double tolerance);
+/* Divides the light of an observation, black aside, and its deviation by the lamp's factor. */
+void clt_watch_correct(const clt_watch *watch, const clt_image *black, clt_image *seen, clt_image *deviation);
+/* The lamp is as it was with black and flood. */
+void clt_watch_forget_lamp(clt_watch *watch);
 
 /* "cells around (12, 8) are 38 % darker (25 % of the picture differ)"; size >= 120. */
 void clt_change_format(const clt_change *change, char *text, size_t size);

@@ -67,7 +67,8 @@ int cli_print_json(json_t *document);
 
 extern const cli_command cli_command_demo, cli_command_acquire, cli_command_compensate, cli_command_relight,
     cli_command_bounces, cli_command_separate, cli_command_repaint, cli_command_inspect, cli_command_tradeoff,
-    cli_command_reproduce, cli_command_simulate, cli_command_scene, cli_command_calibrate, cli_command_doctor;
+    cli_command_reproduce, cli_command_simulate, cli_command_scene, cli_command_calibrate, cli_command_doctor,
+    cli_command_bench;
 
 /* The commands that talk to a running daemon (client.c): status reacquire refine show watch snapshot hold resume
  * reload. */

@@ -141,7 +141,7 @@ static void look_at_group(doctor *self, const char *name, const char *opens, jso
 /* A kind of node that this user may not open is a finding; none at all is one of the devices. */
 static void look_at_nodes(doctor *self, const char *folder, const char *prefix, const char *driver,
                           const char *advice) {
-  char path[CLT_PATH_MAX], refused[256] = "";
+  char path[64], refused[256] = "";
   int count = 0;
   for (int k = 0; k < 256; k++) {
     snprintf(path, sizeof path, "%s/%s%d", folder, prefix, k);

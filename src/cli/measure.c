@@ -22,6 +22,12 @@ clt_status cli_measure_options(const cli_command *command, const cli_arguments *
   if (!status) {
     status = cli_number(command, arguments, "seconds", 0, 1e9, &config->acquire.seconds, error);
   }
+  if (!status) {
+    status = cli_integer(command, arguments, "watch", 0, 1000000, &config->acquire.watch, error);
+  }
+  if (!status) {
+    status = cli_number(command, arguments, "patience", 0, 1e6, &config->acquire.patience_s, error);
+  }
   config->acquire.journal = cli_value(command, arguments, "resume");
   if (!status) {
     status = cli_integer(command, arguments, "repeats", 1, 256, &config->acquire.repeats, error);
@@ -105,6 +111,7 @@ clt_status cli_measure(const clt_station_config *config, const clt_station *stat
                        clt_transport **out, clt_error *error) {
   clt_acquire_options options = config->acquire;
   options.scheme = config->scheme[0] ? config->scheme : NULL;
+  options.recorded = config->replay[0] != '\0';
   options.progress = cli_progress_acquire;
   options.context = progress;
   clt_status status = clt_acquire(station->rig, &options, out, error);

@@ -14,6 +14,8 @@ enum { COLOURS = 3, UNCOMPENSATED_CELLS = 1 };
 static const double report_s = 0.25, usual_refresh_s = 1.0 / 60;
 /* Repetitions of a picture that stands still, after which it is as good as it gets. */
 enum { REPEATS_MOST = 60 };
+/* So many frames in a row without a step, from the first on, are worth a warning. */
+enum { DIRECT_MOST = 30 };
 
 typedef struct mover {
   const daemon_boxes *boxes;
@@ -147,6 +149,13 @@ static void count(mover *self, int64_t start_ns, bool fresh, int skipped) {
   found->frames += fresh;
   found->skipped += (uint64_t)skipped;
   found->late += fresh && late_s > refresh_s(self);
+  found->direct += fresh && found->last.direct;
+  if (fresh && found->last.direct && found->direct == DIRECT_MOST && found->frames == DIRECT_MOST) {
+    clt_log(CLT_LOG_WARNING,
+            "budget_ms = %g leaves no time to solve with this transport: frames follow their direct "
+            "light only; raise it, or measure fewer cells",
+            self->job->frames.live.budget_ms);
+  }
   found->ms = 1e-6 * (double)(now_ns - start_ns);
   found->compensated = self->frames != NULL;
 }

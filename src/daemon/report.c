@@ -118,7 +118,8 @@ json_t *control_moving_note(const control *self) {
                            (json_int_t)moved->late, "skipped", (json_int_t)moved->skipped, "fps", moved->fps,
                            "compensated", moved->compensated, "ms", moved->ms);
   if (moved->compensated) {
-    json_object_set_new(note, "error", json_real(last->live.error));
+    json_object_set_new(note, "direct", json_integer((json_int_t)moved->direct));
+    json_object_set_new(note, "error", last->direct ? json_null() : json_real(last->live.error));
     json_object_set_new(note, "scale", json_real(last->scale));
     json_object_set_new(note, "offset", json_real(last->offset));
     json_object_set_new(note, "stages",

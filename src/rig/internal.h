@@ -17,6 +17,7 @@ typedef struct clt_camera_rig {
   clt_merge merge;
   clt_agreement agreement; /* empty where nothing is verified */
   float *codes;            /* panel values, [(c * panel height + y) * panel width + x] */
+  long doubted;            /* patterns whose exposures contradicted each other at first */
   long strange, torn;      /* frames that carried another picture's number; that contradicted the others */
 } clt_camera_rig;
 

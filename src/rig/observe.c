@@ -58,6 +58,7 @@ static clt_status verify(clt_camera_rig *rig, int64_t not_before, clt_error *err
   size_t allowed = (size_t)(DOUBTFUL_SHARE * (double)rig->footprints.cells);
   bool bad[CLT_EXPOSURES_MAX];
   size_t apart = clt_agreement_check(&rig->agreement, &rig->merge, bad);
+  rig->doubted += apart > allowed;
   for (int round = 0; round < 2 * rig->config.attempts && apart > 0; round++) {
     for (int k = 0; k < exposures; k++) {
       clt_status status = bad[k] ? take_exposure(rig, not_before, k, error) : CLT_OK;

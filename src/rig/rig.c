@@ -16,7 +16,9 @@ static void describe_rig(const clt_rig *base, clt_rig_info *info) {
                          .response = rig->response,
                          .source = rig->config.source,
                          .patterns = rig->shots.shown,
-                         .frames = rig->shots.frames};
+                         .frames = rig->shots.frames,
+                         .doubted = rig->doubted,
+                         .seconds = (double)rig->shots.last_ns * 1e-9};
 }
 
 static void close_rig(clt_rig *base) {

@@ -131,5 +131,6 @@ clt_status clt_shots_take(clt_shots *shots, int64_t not_before_ns, double exposu
                            shots->attempts);
   }
   shots->frames += status == CLT_OK;
+  shots->last_ns = status == CLT_OK ? frame->exposed_ns : shots->last_ns;
   return status;
 }

@@ -22,6 +22,7 @@ typedef struct clt_shots {
   long retaken;     /* frames that were refused and asked for again */
   long stuck;       /* of these, frames that repeated the samples of the one before */
   bool noisy;       /* the sensor's noise makes two equal frames impossible, so that a frame which repeats is refused */
+  int64_t last_ns;  /* start of the last frame that was used, on the devices' clock */
   uint64_t digest;  /* of the samples of the frame before; 0: there was none */
 } clt_shots;
 

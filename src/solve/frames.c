@@ -25,6 +25,7 @@ struct clt_frames {
   float *means;            /* of the content: three colours */
   float *picture, *before; /* the channels of this frame and of the one before */
   float *target, *drive;
+  float *then_target, *then_drive; /* of the last frame that was solved for */
 };
 
 static clt_status find_white(clt_frames *self, const clt_white *white, clt_error *error) {
@@ -40,7 +41,7 @@ static clt_status find_white(clt_frames *self, const clt_white *white, clt_error
 
 static clt_status prepare(clt_frames *self, const clt_frames_options *options, clt_error *error) {
   size_t cells = self->info.cols, values = (size_t)self->info.channels * cells;
-  float *work = clt_alloc(COLOURS * cells + 4 * values, sizeof *work);
+  float *work = clt_alloc(COLOURS * cells + 6 * values, sizeof *work);
   if (work == NULL) {
     return clt_fail(error, CLT_FAILED, "no memory for moving pictures of %zu cells", cells);
   }
@@ -49,6 +50,8 @@ static clt_status prepare(clt_frames *self, const clt_frames_options *options, c
   self->before = self->picture + values;
   self->target = self->before + values;
   self->drive = self->target + values;
+  self->then_target = self->drive + values;
+  self->then_drive = self->then_target + values;
   clt_status status = find_white(self, &options->white, error);
   if (status == CLT_OK && (options->reach || options->white.kind == CLT_WHITE_FEASIBLE)) {
     double smooth_s = options->smooth_s > 0 ? options->smooth_s : SMOOTH_S;
@@ -133,6 +136,36 @@ static bool map(clt_frames *self, double seconds, clt_frames_result *result) {
   return !moves;
 }
 
+/* Without a step the solver gives the drive of an older frame. From nothing this is the uncompensated picture. */
+static void follow_directly(clt_frames *self) {
+  size_t cells = self->info.cols;
+  for (int c = 0; c < self->info.channels; c++) {
+    const unsigned char *lit = clt_certificate_lit(self->certificate, c);
+    const double *f = clt_certificate_first_bounce(self->certificate, c);
+    for (size_t i = 0, at = (size_t)c * cells; i < cells; i++, at++) {
+      double change = lit[i] ? (double)(self->target[at] - self->then_target[at]) / f[i] : 0;
+      self->drive[at] = (float)fmin(fmax((double)self->then_drive[at] + change, 0), 1);
+    }
+  }
+}
+
+/* The drive of this frame: solved for, or as near as no time allows. */
+static clt_status solve(clt_frames *self, clt_frames_result *result, clt_error *error) {
+  size_t values = (size_t)self->info.channels * self->info.cols;
+  clt_status status = clt_live_solve(self->live, self->target, self->drive, &result->live, error);
+  if (status != CLT_OK) {
+    return status;
+  }
+  result->direct = !result->live.converged && result->live.steps == 0;
+  if (result->direct) {
+    follow_directly(self);
+  } else {
+    memcpy(self->then_target, self->target, values * sizeof(float));
+    memcpy(self->then_drive, self->drive, values * sizeof(float));
+  }
+  return CLT_OK;
+}
+
 static void fill_fields(const clt_frames *self, double scale, float *gain, float *offset) {
   size_t cells = self->info.cols;
   for (int k = 0; k < COLOURS; k++) {
@@ -168,7 +201,7 @@ clt_status clt_frames_next(clt_frames *self, const uint8_t *content, int width, 
   result->ms[CLT_FRAMES_MEAN] = lap(&start_ns);
   bool still = map(self, seconds, result);
   result->ms[CLT_FRAMES_MAP] = lap(&start_ns);
-  status = clt_live_solve(self->live, self->target, self->drive, &result->live, error);
+  status = solve(self, result, error);
   result->ms[CLT_FRAMES_SOLVE] = lap(&start_ns);
   if (status == CLT_OK) {
     fill_fields(self, result->scale, gain, offset);

@@ -36,7 +36,7 @@ static void measure_white(clt_live *live) {
 
 /* The hierarchy, where the storage allows one. */
 static clt_status choose_form(clt_live *live, clt_error *error) {
-  static const double LEFT_OUT = 1e-3; /* by a leaf, of a cell's light */
+  static const double LEFT_OUT = 5e-3; /* by a leaf, of a cell's light */
   clt_status status = CLT_OK;
   if (strcmp(live->info.storage, "blocks") == 0) {
     status = clt_transport_create_hierarchy(live->transport, LEFT_OUT, &live->made, error);
@@ -98,10 +98,12 @@ double clt_live_size(const clt_live *live, const float *target) {
   return sum > 0 ? sqrt(sum) : live->white_norm > 0 ? live->white_norm : 1;
 }
 
-/* What the operator may be off by of what is seen: as its check patterns found it, and what the hierarchy left out. */
+/* What the operator may be off by of what is seen: as its check patterns found it, and what the hierarchy left out. The
+ * checks are random patterns, in which much averages out that a smooth picture shows (docs/live.md). */
 static double operator_error(const clt_live *live) {
+  static const double SMOOTH_SHARE = 2.5;
   const double checked = clt_transport_origin(live->transport)->error;
-  return hypot(checked > 0 ? checked : 0, clt_transport_simplified(live->transport));
+  return hypot(checked > 0 ? SMOOTH_SHARE * checked : 0, clt_transport_simplified(live->transport));
 }
 
 static clt_status check_target(const clt_live *live, const float *target, clt_error *error) {

@@ -19,6 +19,7 @@
 #define CLT_SOLVE_LIVE_FAR_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 #include "solve/live.h"
 #include "transport/hierarchy.h"
@@ -56,10 +57,15 @@ struct clt_far {
   const clt_hierarchy_storage *hierarchy;
   const clt_live_kernels *kernels;
   int width;
-  size_t cells, items, rank;
-  clt_live_item *item; /* channel by channel, leaf by leaf */
-  float *plane;        /* the planes below, channels x cells each */
+  size_t cells, values, items, rank; /* values: channels x cells */
+  clt_live_item *item;               /* channel by channel, leaf by leaf */
+  float *plane;                      /* the planes below, channels x cells each */
   float *wanted, *residual, *inverse, *drive[3];
+  /* near light by directions, `directions` planes: T_ij at i for j = i + shift; NULL where some near entries join cells
+   * that are no neighbours. Drives have room for a shift before and behind them. */
+  int directions;
+  ptrdiff_t shift[9];
+  float *spill;
   unsigned char *held, *factored; /* 1 where the projection holds a cell: now, and in the factor */
   bool open;                      /* no cell is taken to be held: a step from nothing goes for the unbounded drive */
   int now, best;                  /* of drive */
@@ -73,6 +79,8 @@ struct clt_far {
 
 extern const clt_live_kernels *const clt_live_variants[];
 const clt_live_kernels *clt_live_choose(void);
+
+clt_status clt_live_spread_near(clt_far *far, size_t channels, clt_error *error);
 
 /* Room for the small systems of every channel. */
 clt_status clt_newton_reserve(clt_far *far, int channels, clt_error *error);

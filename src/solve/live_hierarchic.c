@@ -31,7 +31,8 @@ static size_t values_of(const clt_live *live) {
 static clt_status reserve(clt_live *live, clt_far *far, clt_error *error) {
   enum { PLANES = 6 };
   const size_t values = values_of(live);
-  far->plane = clt_alloc(values, PLANES * sizeof *far->plane);
+  const size_t margin = (size_t)far->width + 1, drive = values + 2 * margin;
+  far->plane = clt_alloc((PLANES - 3) * values + 3 * drive, sizeof *far->plane);
   far->held = clt_alloc(values, 2);
   far->item = clt_alloc(far->items, sizeof *far->item);
   if (far->plane == NULL || far->held == NULL || far->item == NULL) {
@@ -42,7 +43,7 @@ static clt_status reserve(clt_live *live, clt_far *far, clt_error *error) {
   far->residual = far->plane + values;
   far->inverse = far->plane + 2 * values;
   for (size_t k = 0; k < 3; k++) {
-    far->drive[k] = far->plane + (3 + k) * values;
+    far->drive[k] = far->plane + 3 * values + k * drive + margin;
   }
   return clt_newton_reserve(far, live->info.channels, error);
 }
@@ -90,12 +91,16 @@ static clt_status create(clt_live *live, clt_error *error) {
                    .kernels = clt_live_choose(),
                    .width = live->info.width,
                    .cells = live->info.cols,
+                   .values = values_of(live),
                    .items = hierarchy->leaves * (size_t)live->info.channels,
                    .rank = hierarchy->rank};
   clt_status status = reserve(live, far, error);
   for (size_t k = 0; status == CLT_OK && k < far->items; k++) {
     far->item[k].channel = (int)(k / hierarchy->leaves);
     far->item[k].leaf = k % hierarchy->leaves;
+  }
+  if (status == CLT_OK) {
+    status = clt_live_spread_near(far, (size_t)live->info.channels, error);
   }
   return status == CLT_OK ? invert_cells(live, far, error) : status;
 }
@@ -106,6 +111,7 @@ static void destroy(clt_live *live) {
     clt_newton_release(far);
     free(far->plane);
     free(far->held);
+    free(far->spill);
     free(far->item);
     free(far);
   }

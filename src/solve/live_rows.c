@@ -47,6 +47,18 @@ INLINE float clip(float value) {
   return value < 1 ? value : 1;
 }
 
+/* near = O x over a row, by the planes of its directions. */
+INLINE void add_spill(const clt_far *far, place first, size_t values, int32_t width, float *restrict near) {
+  memset(near, 0, (size_t)width * sizeof *near);
+  for (int direction = 0; direction < far->directions; direction++) {
+    const float *restrict spill = far->spill + (size_t)direction * values + first.at;
+    const float *restrict x = far->drive[far->now] + (ptrdiff_t)first.at + far->shift[direction];
+    for (int32_t k = 0; k < width; k++) {
+      near[k] += spill[k] * x[k];
+    }
+  }
+}
+
 /* near = O x over a row. */
 INLINE void add_near(const clt_far *far, const clt_live_item *item, place first, int32_t width, float *near) {
   const clt_hierarchy_storage *own = far->hierarchy;
@@ -66,7 +78,8 @@ INLINE void add_near(const clt_far *far, const clt_live_item *item, place first,
 typedef struct look_sums {
   columns free, held, whole;
   float residual[SIDE], gap[SIDE], seen[SIDE];
-  int changed[SIDE], held_cells[SIDE];
+  float held_cells[SIDE];
+  int changed[SIDE];
 } look_sums;
 
 /* One row: f and h are bilinear along it. */
@@ -84,21 +97,33 @@ INLINE void look_row(const clt_far *far, const clt_live_item *item, int32_t row,
   const float f0 = item->far[0] + v * item->far[2], f1 = item->far[1] + v * item->far[3];
   const float h0 = item->pull[0] + v * item->pull[2], h1 = item->pull[1] + v * item->pull[3];
   const float mean = far->mean[item->channel];
-  const bool bounded = !far->open;
-  float near[SIDE];
-  add_near(far, item, first, width, near);
+  const float bounded = far->open ? 0.0f : 1.0f;
+  float near[SIDE], lit[SIDE], want[SIDE], hold[SIDE];
+  if (far->spill != NULL) {
+    add_spill(far, first, far->values, width, near);
+  } else {
+    add_near(far, item, first, width, near);
+  }
+  /* loops apart: conditions that share one loop become branches, which no vector instruction takes */
+  for (int32_t k = 0; k < width; k++) {
+    lit[k] = inverse[k] > 0 ? 1.0f : 0.0f;
+  }
   for (int32_t k = 0; k < width; k++) {
     const float light = own[k] * x[k] + near[k] + scale[k] * (f0 + f1 * u[k]) + flood[k] * mean;
-    const float lit = inverse[k] > 0 ? 1.0f : 0.0f, r = lit * (wanted[k] - light);
-    const float want = x[k] + inverse[k] * (r + gather[k] * inverse[k] * (h0 + h1 * u[k]));
-    const float step = clip(want) - x[k];
-    const bool holds = bounded && (!(want > 0) || !(want < 1));
-    const float give = gather[k] * (holds ? step : r * inverse[k]);
-    const float take = holds ? lit * scale[k] * (r - own[k] * step) : 0.0f;
+    const float r = lit[k] * (wanted[k] - light);
+    want[k] = x[k] + inverse[k] * (r + gather[k] * inverse[k] * (h0 + h1 * u[k]));
     residual[k] = r;
-    state[k] = holds;
-    sums->changed[k] += holds != (factored[k] != 0);
-    sums->held_cells[k] += holds && lit > 0;
+    sums->seen[k] += lit[k] * light * light;
+  }
+  for (int32_t k = 0; k < width; k++) {
+    const float low = want[k] > 0 ? 0.0f : bounded, high = want[k] < 1 ? 0.0f : bounded;
+    hold[k] = low + high;
+  }
+  for (int32_t k = 0; k < width; k++) {
+    const float r = residual[k], step = clip(want[k]) - x[k];
+    const float give = gather[k] * (hold[k] * step + (1 - hold[k]) * (r * inverse[k]));
+    const float take = hold[k] * lit[k] * scale[k] * (r - own[k] * step);
+    sums->held_cells[k] += hold[k] * lit[k];
     sums->free.even[k] += give;
     sums->free.tilted[k] += v * give;
     sums->held.even[k] += take;
@@ -106,8 +131,12 @@ INLINE void look_row(const clt_far *far, const clt_live_item *item, int32_t row,
     sums->whole.even[k] += scale[k] * r;
     sums->whole.tilted[k] += v * scale[k] * r;
     sums->residual[k] += r * r;
-    sums->gap[k] += lit * (own[k] * step) * (own[k] * step);
-    sums->seen[k] += lit * light * light;
+    sums->gap[k] += lit[k] * (own[k] * step) * (own[k] * step);
+  }
+  for (int32_t k = 0; k < width; k++) {
+    const unsigned char holds = hold[k] > 0 ? 1 : 0;
+    sums->changed[k] += holds ^ factored[k];
+    state[k] = holds;
   }
 }
 
@@ -129,7 +158,7 @@ INLINE void look(const clt_far *far, clt_live_item *item) {
     item->gap += (double)sums.gap[k];
     item->seen += (double)sums.seen[k];
     item->changed += sums.changed[k];
-    item->held_cells += sums.held_cells[k];
+    item->held_cells += (long)sums.held_cells[k];
   }
 }
 

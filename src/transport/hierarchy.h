@@ -40,7 +40,7 @@ const clt_hierarchy_storage *clt_hierarchic_of(const clt_transport *transport);
 
 /* Storage without arrays, into transport->storage. */
 clt_status clt_hierarchic_begin(clt_transport *transport, size_t leaves, size_t rank, const char *source,
-                               clt_error *error);
+                                clt_error *error);
 /* Makes storage that has its leaves and its near pattern ready for products, after checking both. */
 clt_status clt_hierarchic_finish(clt_transport *transport, size_t entries, const char *source, clt_error *error);
 clt_status clt_hierarchic_check(const clt_transport *transport, const char *source, clt_error *error);

@@ -247,6 +247,13 @@ static clt_status build_hierarchy(build *job, double tolerance, clt_error *error
     fill_cells(job);
     status = factor_columns(job, error);
   }
+  if (status == CLT_OK) {
+    double left_out[CLT_CHANNELS_MAX];
+    for (size_t c = 0; c < (size_t)from->channels; c++) {
+      left_out[c] = tolerance * job->planes.size[c * blocks->count];
+    }
+    status = clt_leaves_compress(job->own, (size_t)from->channels, left_out, error);
+  }
   return status == CLT_OK ? clt_hierarchic_finish(job->to, entries, "a hierarchy", error) : status;
 }
 

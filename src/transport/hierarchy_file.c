@@ -82,7 +82,7 @@ static clt_status check_near(const clt_hierarchy_storage *own, size_t cells, siz
 }
 
 clt_status clt_hierarchic_begin(clt_transport *transport, size_t leaves, size_t rank, const char *source,
-                               clt_error *error) {
+                                clt_error *error) {
   clt_hierarchy_storage *own = clt_alloc(1, sizeof *own);
   if (own == NULL) {
     return clt_fail(error, CLT_FAILED, "%s: no memory for a hierarchy", source);

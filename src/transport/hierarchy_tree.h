@@ -22,4 +22,7 @@ double clt_leaf_fit(const clt_planes *planes, size_t plane, const clt_leaf *leaf
  * would not tell better than noise does. *leaf is allocated, *count leaves. */
 clt_status clt_leaves_grow(const clt_planes *planes, clt_leaf **leaf, size_t *count, clt_error *error);
 
+/* Lowers the rank of left right' by what changes a product by less than tolerance[channel] times the drive's norm. */
+clt_status clt_leaves_compress(clt_hierarchy_storage *own, size_t channels, const double *tolerance, clt_error *error);
+
 #endif

@@ -18,6 +18,9 @@ typedef struct fake_rig {
   size_t blind;  /* this cell is never seen; SIZE_MAX: none */
   uint64_t random;
   long patterns;
+  double pattern_s;      /* of the devices' time */
+  long doubted;          /* patterns at which exposures contradicted each other */
+  double lamp_gain;      /* of the light, black aside, in pattern n: 1 + lamp_gain sin(n / 20) */
   unsigned pause_us;     /* that an observation takes */
   long dies_at;          /* kill -9 of the process before that pattern; 0: never */
   clt_status fails_with; /* from pattern fails_at on */
@@ -26,8 +29,15 @@ typedef struct fake_rig {
 
 static inline void fake_describe(const clt_rig *base, clt_rig_info *info) {
   const fake_rig *rig = (const fake_rig *)base;
-  *info =
-      (clt_rig_info){rig->width, rig->height, rig->channels, "gamma 2.2", "a matrix", rig->patterns, 3 * rig->patterns};
+  *info = (clt_rig_info){.width = rig->width,
+                         .height = rig->height,
+                         .channels = rig->channels,
+                         .response = "gamma 2.2",
+                         .source = "a matrix",
+                         .patterns = rig->patterns,
+                         .frames = 3 * rig->patterns,
+                         .doubted = rig->doubted,
+                         .seconds = rig->pattern_s * (double)rig->patterns};
 }
 
 /* The light of one cell; patterns are mostly zeros, which lit lists the rest of. */
@@ -67,6 +77,7 @@ static inline clt_status fake_observe(clt_rig *base, const clt_image *drive, clt
     }
     for (size_t i = 0; i < cells; i++) {
       double light = fake_light(rig, c, i, x, lit, count);
+      light = rig->black + (light - rig->black) * (1 + rig->lamp_gain * sin((double)rig->patterns / 20));
       double sigma = sqrt(rig->dark * rig->dark + rig->photon * light);
       radiance->data[(size_t)c * cells + i] = (float)(light + sigma * (sigma > 0 ? test_normal(&rig->random) : 0));
       deviation->data[(size_t)c * cells + i] = i == rig->blind ? INFINITY : (float)sigma;

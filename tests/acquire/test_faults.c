@@ -191,6 +191,24 @@ static void blocks_survive_the_scripts(void **state) {
   run_scripts(&(measurement){"blocks", 16, 12, WATCH, 30}, SEEDS);
 }
 
+/* By the looks that come by themselves, 3.7 s apart, and those that follow contradictions. */
+static void who_crosses_between_two_looks_is_found(void **state) {
+  (void)state;
+  const measurement with = {"hierarchical", 16, 12, -1, 30};
+  outcome clean = measure(&with, &(fault_script){0}, 1);
+  assert_int_equal(clean.status, CLT_OK);
+  for (unsigned seed = 1; seed <= 8; seed++) {
+    uint64_t random = 500 + seed;
+    fault_script script = {.walk_for_s = 1 + 2 * test_random(&random)};
+    script.walk_s = (clean.seconds - script.walk_for_s) * test_random(&random);
+    script.walk_gain = test_random(&random) < 0.5 ? 0.3 : 1.6;
+    outcome out = measure(&with, &script, seed);
+    print_outcome(&with, seed, &script, &clean, &out);
+    assert_int_equal(out.status, CLT_OK);
+    assert_true(out.error <= 1.5 * clean.error);
+  }
+}
+
 static void a_change_that_stays_is_an_error(void **state) {
   (void)state;
   outcome out = measure(&(measurement){"hierarchical", 16, 12, WATCH, 1}, &(fault_script){.stays_s = 12}, 1);
@@ -211,9 +229,9 @@ static void a_camera_that_stays_away_is_an_error(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(a_change_that_stays_is_an_error),  cmocka_unit_test(a_camera_that_stays_away_is_an_error),
-      cmocka_unit_test(brute_force_survives_the_scripts), cmocka_unit_test(hierarchical_survives_the_scripts),
-      cmocka_unit_test(blocks_survive_the_scripts),
+      cmocka_unit_test(who_crosses_between_two_looks_is_found), cmocka_unit_test(a_change_that_stays_is_an_error),
+      cmocka_unit_test(a_camera_that_stays_away_is_an_error),   cmocka_unit_test(brute_force_survives_the_scripts),
+      cmocka_unit_test(hierarchical_survives_the_scripts),      cmocka_unit_test(blocks_survive_the_scripts),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,7 +1,7 @@
 """counterlight doctor in the guest, with the simulated USB camera behind the real uvcvideo: what is automatic is found and
 nothing is touched; a configuration that fits passes, one that does not fails with the right advice.
 
-    guest_doctor.py COUNTERLIGHT UVCSIM"""
+    guest_doctor.py COUNTERLIGHT CAMERA"""
 import json
 import os
 import pathlib
@@ -76,7 +76,7 @@ def main():
     folder = "/run/doctor"
     os.makedirs(folder)
     subprocess.run(["modprobe", "-a", "vhci-hcd", "uvcvideo"], check=True)
-    camera = subprocess.Popen([simulated, "-f", "30"])
+    camera = subprocess.Popen([simulated, "-w", "640", "-h", "480"])
     start = time.monotonic()
     while not os.path.exists("/dev/video0"):
         assert time.monotonic() - start < NODE_WAIT_S

@@ -150,7 +150,9 @@ class Display(unittest.TestCase):
 
     def ask(self, text):
         with tempfile.TemporaryDirectory() as folder:
-            return answer("--config", configuration(folder, text), DISPLAY=self.display, LIBGL_ALWAYS_SOFTWARE="1")
+            # Mesa's driver is unloaded with what it leaks, which no suppression can name then.
+            return answer("--config", configuration(folder, text), DISPLAY=self.display, LIBGL_ALWAYS_SOFTWARE="1",
+                          LSAN_OPTIONS="detect_leaks=0")
 
     def test_monitor_and_renderer(self):
         code, document = self.ask('projector = { driver = "glfw"; };')

@@ -1,9 +1,9 @@
-/* Checks one camera of libcamera in the guest: libcamera_probe DEVICE CHECK [ARGUMENT]. Exit 0 where it holds.
+/* Checks one camera of libcamera in the guest: libcamera_probe DEVICE CHECK[=ARGUMENT]... Exit 0 where all hold.
  *
  *   frames           whole, in order, none from the future
- *   exposure NODE    what is set is what NODE's driver has, and automatic exposure is off
+ *   exposure=NODE    the first frame after setting has the light of it, NODE's driver has it, automatic exposure is off
  *   cycles           ten of opening, taking and closing leave no descriptor and no thread
- *   unplug PID       ends PID, which must make the camera go, and once only; opening it again finds nothing
+ *   unplug=PID       ends PID, which must make the camera go, and once only; opening it again finds nothing
  *   return           opens it as soon as it is there, and takes a frame */
 #include <dirent.h>
 #include <fcntl.h>
@@ -21,7 +21,11 @@
 #include "device/camera/libcamera.h"
 
 enum { CYCLES = 10, FRAMES = 12 };
+enum { WIDTH = 720, HEIGHT = 480 }; /* vimc takes multiples of 6 */
 #define TIMEOUT_S 10.0
+/* The simulated camera sees a radiance of 1 everywhere: so much of full scale in a second, and codes are whole. */
+#define SENSITIVITY 20.0
+#define LIGHT_TOLERANCE 0.003
 #define PLUGGED_S 30.0
 
 static void must(bool holds, const char *format, ...) CLT_PRINTF(2, 3);
@@ -48,7 +52,8 @@ static int count_entries(const char *folder) {
 }
 
 static clt_status try_open(const char *device, clt_camera **camera, clt_error *error) {
-  clt_camera_config config = {.format = "auto", .gain = -1, .focus = -1, .power_line_hz = -1};
+  clt_camera_config config = {
+      .format = "auto", .width = WIDTH, .height = HEIGHT, .gain = -1, .focus = -1, .power_line_hz = -1};
   snprintf(config.device, sizeof config.device, "%s", device);
   return clt_libcamera_camera_open(&config, camera, error);
 }
@@ -100,6 +105,16 @@ static int read_control(const char *node, unsigned id) {
   return control.value;
 }
 
+/* Of full scale, over all samples. */
+static double mean_of(const clt_frame *frame) {
+  size_t count = (size_t)frame->width * (size_t)frame->height * (size_t)frame->channels;
+  double sum = 0;
+  for (size_t k = 0; k < count; k++) {
+    sum += frame->samples[k];
+  }
+  return sum / (double)count / ((1 << frame->bits) - 1);
+}
+
 static void check_exposure(const char *device, const char *node) {
   static const double asked_s[] = {0.002, 0.0123, 0.0333, 0.0001, 0.01234};
   clt_camera *camera = open_camera(device);
@@ -108,7 +123,10 @@ static void check_exposure(const char *device, const char *node) {
     must(camera->driver->set_exposure(camera, asked_s[k], &error) == CLT_OK, "set: %s", error.message);
     clt_frame frame = take(camera, clt_clock_ns());
     int units = read_control(node, V4L2_CID_EXPOSURE_ABSOLUTE);
-    printf("asked %.6f s, frame %.6f s, driver %d x 100 us\n", asked_s[k], frame.exposure_s, units);
+    printf("asked %.6f s, frame %.6f s, driver %d x 100 us, light %.4f\n", asked_s[k], frame.exposure_s, units,
+           mean_of(&frame));
+    must(fabs(mean_of(&frame) - SENSITIVITY * frame.exposure_s) < LIGHT_TOLERANCE,
+         "the first frame does not have the light of its exposure");
     must(fabs(frame.exposure_s - 1e-4 * units) < 1e-9, "the frame's exposure is not the driver's");
     must(fabs(frame.exposure_s - asked_s[k]) <= 0.5e-4 + 1e-9, "the exposure is not what was asked for");
     must(read_control(node, V4L2_CID_EXPOSURE_AUTO) == V4L2_EXPOSURE_MANUAL, "automatic exposure is on");
@@ -172,22 +190,31 @@ static void check_return(const char *device, const char *unused) {
   camera->driver->close(camera);
 }
 
-int main(int count, char **words) {
-  static const struct {
-    const char *name;
-    void (*run)(const char *device, const char *argument);
-  } checks[] = {{"frames", check_frames},
-                {"exposure", check_exposure},
-                {"cycles", check_cycles},
-                {"unplug", check_unplug},
-                {"return", check_return}};
-  setvbuf(stdout, NULL, _IOLBF, 0);
-  for (size_t k = 0; count > 2 && k < sizeof checks / sizeof checks[0]; k++) {
-    if (strcmp(checks[k].name, words[2]) == 0) {
-      checks[k].run(words[1], count > 3 ? words[3] : "");
-      return 0;
+static const struct {
+  const char *name;
+  void (*run)(const char *device, const char *argument);
+} checks[] = {{"frames", check_frames},
+              {"exposure", check_exposure},
+              {"cycles", check_cycles},
+              {"unplug", check_unplug},
+              {"return", check_return}};
+
+static void run_check(const char *device, const char *word) {
+  size_t length = strcspn(word, "=");
+  for (size_t k = 0; k < sizeof checks / sizeof checks[0]; k++) {
+    if (strlen(checks[k].name) == length && strncmp(checks[k].name, word, length) == 0) {
+      printf("%s, %s: ", device, checks[k].name);
+      checks[k].run(device, word[length] == '=' ? word + length + 1 : "");
+      return;
     }
   }
-  fprintf(stderr, "usage: libcamera_probe DEVICE frames|exposure|cycles|unplug|return [ARGUMENT]\n");
-  return 2;
+  must(false, "there is no check %s", word);
+}
+
+int main(int count, char **words) {
+  setvbuf(stdout, NULL, _IOLBF, 0);
+  for (int k = 2; k < count; k++) {
+    run_check(words[1], words[k]);
+  }
+  return 0;
 }

@@ -247,13 +247,13 @@ static void what_is_out_of_reach_is_scaled_into_it(void **state) {
     least_offset(self, &scale, &offset);
     print_message("scale %.4f (wanted %.4f), offset %.4f (%.4f), after %d frames, by at most %.4f at once\n",
                   result.scale, scale, result.offset, offset, frames, largest);
-    assert_true(result.settled && offset > 0.002 && scale < 0.99); /* it was out of reach */
+    assert_true(result.settled && (offset > 0.002 || scale < 0.99)); /* it was out of reach */
     assert_near(result.scale, scale, 2e-3);
     assert_near(result.offset, offset, 2e-3);
     wanted(self, &result, target);
     assert_true(shown_error(self, target) < 0.002);
     /* Eight times the usual rate, after a cut: 1 - exp(-8 / 30) = 0.23 of a way that the first steps overestimate. */
-    assert_true(largest < 0.5 * (1 - scale));
+    assert_true(largest <= fmax(0.5 * (1 - scale), 1e-3));
     stage_close(self);
   }
 }
@@ -291,6 +291,31 @@ static void nothing_flickers(void **state) {
     }
     stage_close(self);
   }
+}
+
+/* Where no step fits the budget the picture goes on, by its direct light: from nothing it is the picture as it would be
+ * without compensation, never a dark one. */
+static void without_time_the_picture_goes_on(void **state) {
+  (void)state;
+  stage *self = stage_open(&(clt_frames_options){.live = {.target_error = 1e-5, .budget_ms = 1e-6}});
+  double target[C * N];
+  int direct = 0;
+  for (int frame = 0; frame < 2 * SCENE; frame++) {
+    draw(frame, 3, self->content);
+    clt_frames_result result = run(self, 1.0 / 60);
+    direct += result.direct;
+    wanted(self, &result, target);
+    double off = 0, all = 0;
+    for (int i = 0; i < C * N; i++) {
+      double f = clt_certificate_first_bounce(self->certificate, i / N)[i % N];
+      off += pow((double)clt_frames_drive(self->frames)[i] - fmin(target[i] / f, 1), 2);
+      all += pow(fmin(target[i] / f, 1), 2);
+    }
+    assert_true(!result.direct || direct <= frame || off < 1e-8 * all);
+    assert_true(shown_error(self, target) < 0.5);
+  }
+  print_message("%d of %d frames without a step\n", direct, 2 * SCENE);
+  stage_close(self);
 }
 
 static void memory_is_constant(void **state) {
@@ -350,11 +375,9 @@ static void the_simulated_projector_encodes_by_itself(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(frames_appear_as_wanted),
-      cmocka_unit_test(what_is_out_of_reach_is_scaled_into_it),
-      cmocka_unit_test(nothing_flickers),
-      cmocka_unit_test(memory_is_constant),
-      cmocka_unit_test(the_simulated_projector_encodes_by_itself),
+      cmocka_unit_test(frames_appear_as_wanted), cmocka_unit_test(what_is_out_of_reach_is_scaled_into_it),
+      cmocka_unit_test(nothing_flickers),        cmocka_unit_test(without_time_the_picture_goes_on),
+      cmocka_unit_test(memory_is_constant),      cmocka_unit_test(the_simulated_projector_encodes_by_itself),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -63,14 +63,6 @@ std::string size_name(const libcamera::Size &size) {
   return std::to_string(size.width) + " x " + std::to_string(size.height);
 }
 
-std::string sizes_of(const StreamConfiguration &stream, const PixelFormat &format) {
-  std::string all;
-  for (const libcamera::Size &size : stream.formats().sizes(format)) {
-    all += (all.empty() ? "" : ", ") + size_name(size);
-  }
-  return all;
-}
-
 /* Y'CbCr without a word about it is that of a webcam: BT.601, and limited. */
 void agree_colours(const StreamConfiguration &stream, clt_libcamera_stream *agreed) {
   agreed->ycbcr = 601;
@@ -98,10 +90,13 @@ std::unique_ptr<CameraConfiguration> choose(Camera &camera, const clt_camera_con
   libcamera::Size wanted = stream.size;
   stream.bufferCount = buffers;
   CameraConfiguration::Status status = choice.configuration->validate();
-  if (status == CameraConfiguration::Invalid || stream.pixelFormat != choice.format ||
-      (config.width > 0 && stream.size != wanted)) {
-    throw Failure{CLT_BAD_INPUT, "camera \"" + camera.id() + "\" does not take " + size_name(wanted) + " as " +
-                                     choice.read.name + "; it offers " + sizes_of(stream, choice.format)};
+  if (status == CameraConfiguration::Invalid || stream.pixelFormat != choice.format) {
+    throw Failure{CLT_BAD_INPUT, "camera \"" + camera.id() + "\" cannot be set to " + choice.read.name +
+                                     " alone; choose another `format`"};
+  }
+  if (config.width > 0 && stream.size != wanted) {
+    throw Failure{CLT_BAD_INPUT, "camera \"" + camera.id() + "\" does not take " + size_name(wanted) + " pixels as " +
+                                     choice.read.name + "; the nearest that it takes is " + size_name(stream.size)};
   }
   agreed->code = choice.read.code;
   agreed->width = static_cast<int>(stream.size.width);

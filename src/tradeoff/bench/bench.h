@@ -1,0 +1,20 @@
+/* What the parts of the bench share. */
+#ifndef CLT_TRADEOFF_BENCH_H
+#define CLT_TRADEOFF_BENCH_H
+
+#include "counterlight/bench.h"
+
+/* The picture of frame `number` that T can show: under the drive (channels x cells, room) that is filled as well. */
+void clt_bench_picture(const clt_transport *transport, int number, double *drive, double *seen, float *target);
+/* The median of count times, which are sorted. */
+double clt_bench_median(double *times, size_t count);
+
+clt_status clt_bench_kernels(const clt_transport *transport, clt_bench_report *report, clt_error *error);
+clt_status clt_bench_frames(const clt_transport *transport, const clt_certificate *certificate,
+                            const clt_bench_options *options, clt_bench_frame *frame, clt_error *error);
+/* The report's iteration (eq. 43) in single precision over compressed rows of 128 entries: those near, and a sample of
+ * the far ones, each for its share of them. */
+clt_status clt_bench_jacobi(const clt_transport *transport, double target_error, clt_bench_peer *peer,
+                            clt_error *error);
+
+#endif

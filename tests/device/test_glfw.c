@@ -1,0 +1,209 @@
+/* The projector on Xvfb: what stands on the glass is the pattern, read back by GL and from the screen. */
+#include "device/projector/glfw.h"
+
+#include <epoxy/gl.h>
+
+#include "base/clock.h"
+#include "display.h"
+
+/* Steps of a panel and a picture that has all of them. */
+static void draw_levels(int width, int height, int full, uint64_t seed, float *codes, uint16_t *steps) {
+  size_t plane = (size_t)width * (size_t)height;
+  for (size_t i = 0; i < plane; i++) {
+    for (size_t c = 0; c < 3; c++) {
+      size_t level =
+          i < (size_t)full + 1 ? (i + c * 37) % ((size_t)full + 1) : (size_t)(test_random(&seed) * (full + 1));
+      /* off the step by less than half of one */
+      double off = 0.98 * (test_random(&seed) - 0.5);
+      codes[c * plane + i] = (float)(((double)level + off) / full);
+      steps[i * 3 + c] = (uint16_t)level;
+    }
+  }
+}
+
+static clt_projector *open_projector(int width, int height, bool window) {
+  clt_projector_config config = {
+      .driver = "glfw", .monitor = "auto", .width = width, .height = height, .window = window};
+  clt_projector *projector = NULL;
+  clt_error error = {0};
+  assert_ok(clt_glfw_open_projector(&config, &projector, &error), error);
+  return projector;
+}
+
+/* What was drawn, row 0 at the top, in its own steps. Mesa's software drawing copies it to the screen at a swap, and
+ * keeps it. */
+static void read_drawn(int width, int height, int full, uint16_t *out) {
+  float *pixels = malloc((size_t)width * (size_t)height * 3 * sizeof *pixels);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadBuffer(GL_BACK);
+  glReadPixels(0, 0, width, height, GL_RGB, GL_FLOAT, pixels);
+  for (int y = 0; y < height; y++) {
+    for (int i = 0; i < 3 * width; i++) {
+      double value = pixels[(size_t)(height - 1 - y) * 3 * (size_t)width + (size_t)i] * full;
+      out[(size_t)y * 3 * (size_t)width + (size_t)i] = (uint16_t)lround(value);
+    }
+  }
+  free(pixels);
+}
+
+static void assert_steps(const char *read_by, const uint16_t *got, const uint16_t *wanted, int width, int height) {
+  for (int i = 0; i < 3 * width * height; i++) {
+    if (got[i] != wanted[i]) {
+      fail_msg("%s: pixel %d,%d channel %d is %d, not %d", read_by, i / 3 % width, i / 3 / width, i % 3, got[i],
+               wanted[i]);
+    }
+  }
+}
+
+/* On a screen of that size and depth. */
+static void check_levels(int width, int height, int depth) {
+  test_display display = {0};
+  char screen[32];
+  clt_error error = {0};
+  clt_projector_info info;
+  int64_t shown_ns = 0;
+  snprintf(screen, sizeof screen, "%dx%dx%d", width, height, depth);
+  assert_true(test_display_xvfb(screen, &display));
+  clt_projector *projector = open_projector(0, 0, false);
+  projector->driver->describe(projector, &info);
+  assert_int_equal(info.width, width);
+  assert_int_equal(info.height, height);
+  assert_int_equal(info.bits, depth / 3);
+  assert_int_equal(info.channels, 3);
+  assert_near(info.refresh_s, 1 / 60.0, 1e-9);
+  size_t values = (size_t)width * (size_t)height * 3;
+  float *codes = malloc(values * sizeof *codes);
+  uint16_t *steps = malloc(values * sizeof *steps), *got = malloc(values * sizeof *got);
+  for (uint64_t seed = 1; seed <= 3; seed++) {
+    draw_levels(width, height, (1 << info.bits) - 1, seed, codes, steps);
+    assert_ok(projector->driver->present(projector, codes, &shown_ns, &error), error);
+    read_drawn(width, height, (1 << info.bits) - 1, got);
+    assert_steps("glReadPixels", got, steps, width, height);
+    test_display_grab(&display, 0, 0, width, height, got);
+    assert_steps("XGetImage", got, steps, width, height);
+  }
+  projector->driver->close(projector);
+  free(codes);
+  free(steps);
+  free(got);
+  test_display_stop(&display);
+}
+
+static void test_levels(void **state) {
+  (void)state;
+  check_levels(1280, 800, 24);
+  check_levels(641, 359, 24);
+  check_levels(64, 48, 24);
+}
+
+static void test_ten_bits(void **state) {
+  (void)state;
+  check_levels(320, 200, 30);
+}
+
+/* A window on the desk has the size that was asked for, and its picture is as exact. */
+static void test_window(void **state) {
+  (void)state;
+  enum { WIDTH = 200, HEIGHT = 120 };
+  test_display display = {0};
+  clt_error error = {0};
+  clt_projector_info info;
+  int64_t shown_ns;
+  assert_true(test_display_xvfb("800x600x24", &display));
+  clt_projector *projector = open_projector(WIDTH, HEIGHT, true);
+  projector->driver->describe(projector, &info);
+  assert_int_equal(info.width, WIDTH);
+  assert_int_equal(info.height, HEIGHT);
+  static float codes[WIDTH * HEIGHT * 3];
+  static uint16_t steps[WIDTH * HEIGHT * 3], got[WIDTH * HEIGHT * 3];
+  draw_levels(WIDTH, HEIGHT, 255, 4, codes, steps);
+  assert_ok(projector->driver->present(projector, codes, &shown_ns, &error), error);
+  test_display_grab(&display, 0, 0, WIDTH, HEIGHT, got);
+  assert_steps("XGetImage", got, steps, WIDTH, HEIGHT);
+  projector->driver->close(projector);
+  test_display_stop(&display);
+}
+
+/* Xvfb's swaps do not wait: the clock paces. Every picture has a refresh of its own, which is not before the picture is
+ * really there (present has returned by then, and the screen shows it). */
+static void test_pace(void **state) {
+  (void)state;
+  enum { WIDTH = 160, HEIGHT = 120, FRAMES = 120 };
+  test_display display = {0};
+  clt_error error = {0};
+  int64_t shown_ns = 0, before_ns = 0;
+  static float codes[WIDTH * HEIGHT * 3];
+  static uint16_t got[3];
+  assert_true(test_display_xvfb("160x120x24", &display));
+  clt_projector *projector = open_projector(0, 0, false);
+  const double period_ns = 1e9 / 60;
+  for (int frame = 0; frame < FRAMES; frame++) {
+    int64_t start_ns = clt_clock_ns();
+    codes[0] = (float)(frame % 256) / 255.0F;
+    assert_ok(projector->driver->present(projector, codes, &shown_ns, &error), error);
+    test_display_grab(&display, 0, 0, 1, 1, got);
+    assert_int_equal(got[0], frame % 256);
+    assert_true(shown_ns > start_ns);
+    if (frame > 0) {
+      double refreshes = (double)(shown_ns - before_ns) / period_ns;
+      assert_near(refreshes, round(refreshes), 1e-6);
+      assert_true(refreshes > 0.5);
+    }
+    before_ns = shown_ns;
+  }
+  projector->driver->close(projector);
+  test_display_stop(&display);
+}
+
+/* The desktop's screen saver is off while a projector is open and as before afterwards; wrong names are refused with
+ * those that there are; there is one projector at a time. */
+static void test_manners(void **state) {
+  (void)state;
+  test_display display = {0};
+  clt_error error = {0};
+  int timeout = 0, interval, blanking, exposures;
+  assert_true(test_display_xvfb("320x200x24", &display));
+  XSetScreenSaver(display.x, 123, 0, DontPreferBlanking, DontAllowExposures);
+  XSync(display.x, False);
+  clt_projector *projector = open_projector(0, 0, false), *second = NULL;
+  XGetScreenSaver(display.x, &timeout, &interval, &blanking, &exposures);
+  assert_int_equal(timeout, 0);
+  clt_projector_config config = {.monitor = "auto"};
+  assert_int_equal(clt_glfw_open_projector(&config, &second, &error), CLT_BAD_INPUT);
+  projector->driver->close(projector);
+  XGetScreenSaver(display.x, &timeout, &interval, &blanking, &exposures);
+  assert_int_equal(timeout, 123);
+  strcpy(config.monitor, "HDMI-7");
+  assert_int_equal(clt_glfw_open_projector(&config, &second, &error), CLT_GONE);
+  assert_non_null(strstr(error.message, "no monitor \"HDMI-7\""));
+  assert_non_null(strstr(error.message, "screen 320x200 at 0,0"));
+  config = (clt_projector_config){.monitor = "auto", .width = 1000, .height = 700};
+  assert_int_equal(clt_glfw_open_projector(&config, &second, &error), CLT_BAD_INPUT);
+  assert_non_null(strstr(error.message, "320x200"));
+  test_display_stop(&display);
+  setenv("DISPLAY", ":9999", 1);
+  assert_int_equal(clt_glfw_open_projector(&config, &second, &error), CLT_FAILED);
+  assert_non_null(strstr(error.message, "no display"));
+}
+
+static long resident_kib(void) {
+  FILE *file = fopen("/proc/self/statm", "r");
+  long size, resident = 0;
+  assert_int_equal(fscanf(file, "%ld %ld", &size, &resident), 2);
+  fclose(file);
+  return resident * (sysconf(_SC_PAGESIZE) / 1024);
+}
+
+int main(void) {
+  test_display display = {0};
+  if (!test_display_xvfb("64x64x24", &display)) {
+    fprintf(stderr, "skipped: Xvfb does not start here\n");
+    return TEST_SKIPPED;
+  }
+  test_display_stop(&display);
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_levels), cmocka_unit_test(test_ten_bits),
+                                     cmocka_unit_test(test_window), cmocka_unit_test(test_pace),
+                                     cmocka_unit_test(test_manners)};
+  (void)resident_kib;
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
