@@ -6,6 +6,7 @@ The runner is $CLT_VM_RUN (a command line) or tests/vm/run of this tree."""
 import os
 import pathlib
 import shlex
+import shutil
 import subprocess
 import sys
 
@@ -17,6 +18,9 @@ def main():
     runner = shlex.split(os.environ.get("CLT_VM_RUN", str(HERE.parent / "vm" / "run")))
     if not os.access(runner[0], os.X_OK):
         print(f"skipped: {runner[0]} is not there, which would start a kernel with cameras")
+        return SKIP
+    if shutil.which("v4l2-ctl") is None:
+        print("skipped: v4l2-ctl is not installed (package v4l-utils)")
         return SKIP
     script = HERE / sys.argv[1]
     command = [sys.executable, "-B", str(script), *(os.path.abspath(a) for a in sys.argv[2:])]
