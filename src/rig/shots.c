@@ -8,6 +8,8 @@
 /* Frames under way when the exposure time is changed keep the old one; more than these is no delay but a refusal. */
 enum { FRAMES_MAX = 8 };
 #define EXPOSURE_TOLERANCE 0.01
+/* A camera rounds to its unit of time, and takes one unit at least; what it really took is the frame's exposure_s. */
+#define EXPOSURE_ROUNDING 0.5
 /* Read noise in code values from which no two frames with so many samples off the ends of the scale are equal. */
 #define NOISY 0.2
 enum { TELLING_SAMPLES = 100 };
@@ -88,6 +90,7 @@ static bool repeats(clt_shots *shots, const clt_frame *frame) {
 /* One attempt at a frame that begins at or after not_before. */
 static clt_status try_take(clt_shots *shots, int64_t not_before, double seconds, clt_frame *frame, clt_error *error) {
   clt_camera *camera = shots->camera;
+  double allowed = EXPOSURE_TOLERANCE * seconds + EXPOSURE_ROUNDING * shots->sensor.exposure_min_s;
   bool settled = true, stuck = false;
   clt_status status = camera->driver->set_exposure(camera, seconds, error);
   for (int taken = 0; status == CLT_OK && taken < FRAMES_MAX; taken++) {
@@ -96,7 +99,7 @@ static clt_status try_take(clt_shots *shots, int64_t not_before, double seconds,
     if (status != CLT_OK) {
       return status;
     }
-    settled = fabs(frame->exposure_s - seconds) <= EXPOSURE_TOLERANCE * seconds;
+    settled = fabs(frame->exposure_s - seconds) <= allowed;
     stuck = repeats(shots, frame);
     if (settled && !stuck && frame->exposed_ns >= not_before) {
       return CLT_OK;

@@ -33,6 +33,7 @@ struct fake_world {
   double lag_s;       /* from the refresh until the light has changed */
   int exposure_delay; /* frames that keep the exposure time of before */
   bool deaf;          /* ignores every exposure time asked for */
+  double unit_s;      /* to whole ones of which exposure times are rounded; 0: none */
   fake_event script[FAKE_SCRIPT_MAX];
   int64_t now_ns, frame_ns, changed_ns;
   float before[FAKE_CELLS_MAX * FAKE_CHANNELS], after[FAKE_CELLS_MAX * FAKE_CHANNELS]; /* light of panel pixels */
@@ -69,6 +70,7 @@ static inline clt_status fake_present(clt_projector *projector, const float *cod
 static inline clt_status fake_set_exposure(clt_camera *camera, double seconds, clt_error *error) {
   (void)error;
   fake_world *world = ((fake_camera *)camera)->world;
+  seconds = world->unit_s > 0 ? world->unit_s * round(seconds / world->unit_s) : seconds;
   if (!world->deaf && seconds != world->wanted_s) {
     world->wanted_s = seconds;
     world->wait = world->exposure_delay;

@@ -152,6 +152,19 @@ static void a_deaf_camera_is_named_with_both_exposures(void **state) {
   close_bench(&bench);
 }
 
+/* As USB cameras do, to 0.1 ms: 0.52 ms becomes 0.5 ms, and the light is that of 0.5 ms. */
+static void a_rounded_exposure_counts_as_what_it_was(void **state) {
+  (void)state;
+  rig_bench bench;
+  start_bench(&bench);
+  bench.world.unit_s = bench.world.sensor.exposure_min_s;
+  bench.config.exposures_s[0] = 0.00052;
+  bench.config.exposure_count = 1;
+  open_bench(&bench);
+  check_rounds(&bench, 3);
+  close_bench(&bench);
+}
+
 static void responses_are_undone(void **state) {
   (void)state;
   static const char *const curves[] = {"linear", "srgb", "gamma 2.2"};
@@ -244,6 +257,7 @@ int main(void) {
       cmocka_unit_test(lasting_silence_is_a_timeout_after_every_attempt),
       cmocka_unit_test(a_camera_that_is_gone_is_not_asked_again),
       cmocka_unit_test(a_deaf_camera_is_named_with_both_exposures),
+      cmocka_unit_test(a_rounded_exposure_counts_as_what_it_was),
       cmocka_unit_test(responses_are_undone),
       cmocka_unit_test(cells_cover_their_panel_pixels),
       cmocka_unit_test(settings_that_do_not_fit_are_refused),
