@@ -12,7 +12,7 @@
 typedef struct clt_film clt_film;
 
 typedef struct clt_film_options {
-  int width, height; /* of the panel: pictures are cropped to its aspect, and made smaller where they have more pixels */
+  int width, height; /* of the panel: pictures are cropped to its aspect, and made smaller where they have more */
   double picture_s;  /* that each picture of a folder is shown, > 0 */
 } clt_film_options;
 

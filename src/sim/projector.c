@@ -69,8 +69,8 @@ static clt_status present_live(clt_projector *projector, const clt_live_picture 
                                clt_error *error) {
   simulated_projector *self = (simulated_projector *)projector;
   const clt_scene_description *description = &self->scene->description;
-  clt_status status = clt_live_encode(picture, description->channels, description->height, description->width,
-                                      self->codes, error);
+  clt_status status =
+      clt_live_encode(picture, description->channels, description->height, description->width, self->codes, error);
   if (status != CLT_OK) {
     return status;
   }
