@@ -186,12 +186,104 @@ static void test_manners(void **state) {
   assert_non_null(strstr(error.message, "no display"));
 }
 
+enum {
+  LIVE_WIDTH = 160,
+  LIVE_HEIGHT = 120,
+  GRID_WIDTH = 8,
+  GRID_HEIGHT = 6,
+  LIVE_VALUES = 3 * LIVE_WIDTH * LIVE_HEIGHT
+};
+
+/* A moving picture of random content, correction, responses and crosstalk. */
+static clt_live_picture draw_live(uint64_t seed, uint8_t *content, float *gain, float *offset) {
+  static const double mixed[9] = {0.9, 0.08, 0.02, 0.05, 0.9, 0.05, 0.01, 0.09, 0.9};
+  clt_error error = {0};
+  clt_live_picture picture = {.width = LIVE_WIDTH,
+                              .height = LIVE_HEIGHT,
+                              .content = content,
+                              .grid_width = GRID_WIDTH,
+                              .grid_height = GRID_HEIGHT,
+                              .gain = gain,
+                              .offset = offset};
+  for (size_t i = 0; i < LIVE_VALUES; i++) {
+    content[i] = (uint8_t)(256 * test_random(&seed));
+  }
+  for (size_t i = 0; i < (size_t)3 * GRID_WIDTH * GRID_HEIGHT; i++) {
+    gain[i] = (float)(0.6 + 0.6 * test_random(&seed));
+    offset[i] = (float)(0.3 * test_random(&seed) - 0.15);
+  }
+  picture.panel = clt_panel_of_curve(&(clt_curve){.kind = CLT_CURVE_SRGB});
+  picture.panel.response[1] = (clt_curve){.kind = CLT_CURVE_GAMMA, .gamma = 2.1};
+  assert_ok(clt_panel_set_crosstalk(&picture.panel, mixed, &error), error);
+  return picture;
+}
+
+/* Drawn by the shader: every code is one of the two next to what the processor computes (test_live_encode has that in
+ * double), and their mean over seeds comes to it. */
+static void test_live(void **state) {
+  (void)state;
+  enum { SEEDS = 64, PIXELS = LIVE_WIDTH * LIVE_HEIGHT };
+  static uint8_t content[LIVE_VALUES];
+  static float gain[3 * GRID_WIDTH * GRID_HEIGHT], offset[3 * GRID_WIDTH * GRID_HEIGHT], codes[LIVE_VALUES];
+  static uint16_t got[LIVE_VALUES];
+  static double mean[LIVE_VALUES];
+  test_display display = {0};
+  clt_error error = {0};
+  int64_t shown_ns;
+  clt_live_picture picture = draw_live(5, content, gain, offset);
+  assert_ok(clt_live_encode(&picture, 3, LIVE_HEIGHT, LIVE_WIDTH, codes, &error), error);
+  assert_true(test_display_xvfb("160x120x24", &display));
+  clt_projector *projector = open_projector(0, 0, false);
+  for (picture.seed = 1; picture.seed <= SEEDS; picture.seed++) {
+    assert_ok(projector->driver->present_live(projector, &picture, &shown_ns, &error), error);
+    test_display_grab(&display, 0, 0, LIVE_WIDTH, LIVE_HEIGHT, got);
+    for (int i = 0; i < LIVE_VALUES; i++) {
+      double wanted = 255 * (double)codes[i % 3 * PIXELS + i / 3];
+      assert_true(fabs((double)got[i] - wanted) < 1.05);
+      mean[i] += ((double)got[i] - wanted) / SEEDS;
+    }
+  }
+  double bias = 0, squares = 0;
+  for (int i = 0; i < LIVE_VALUES; i++) {
+    bias += mean[i] / LIVE_VALUES;
+    squares += mean[i] * mean[i] / LIVE_VALUES;
+  }
+  assert_true(fabs(bias) < 0.01);
+  assert_true(sqrt(squares) < 0.5 / sqrt(SEEDS) * 1.2); /* the deviation of one dithered code is at most a half */
+  projector->driver->close(projector);
+  test_display_stop(&display);
+}
+
 static long resident_kib(void) {
   FILE *file = fopen("/proc/self/statm", "r");
   long size, resident = 0;
   assert_int_equal(fscanf(file, "%ld %ld", &size, &resident), 2);
   fclose(file);
   return resident * (sysconf(_SC_PAGESIZE) / 1024);
+}
+
+/* Pictures of both kinds one after another hold no more memory at the end than early on. */
+static void test_memory(void **state) {
+  (void)state;
+  enum { EARLY = 60, FRAMES = 360, GROWTH_KIB = 1024 };
+  static uint8_t content[LIVE_VALUES];
+  static float gain[3 * GRID_WIDTH * GRID_HEIGHT], offset[3 * GRID_WIDTH * GRID_HEIGHT], codes[LIVE_VALUES];
+  test_display display = {0};
+  clt_error error = {0};
+  int64_t shown_ns;
+  long early = 0;
+  clt_live_picture picture = draw_live(6, content, gain, offset);
+  assert_true(test_display_xvfb("160x120x24", &display));
+  clt_projector *projector = open_projector(0, 0, false);
+  for (int frame = 0; frame < FRAMES; frame++) {
+    clt_status status = frame % 2 ? projector->driver->present_live(projector, &picture, &shown_ns, &error)
+                                  : projector->driver->present(projector, codes, &shown_ns, &error);
+    assert_ok(status, error);
+    early = frame == EARLY ? resident_kib() : early;
+  }
+  assert_true(resident_kib() - early < GROWTH_KIB);
+  projector->driver->close(projector);
+  test_display_stop(&display);
 }
 
 int main(void) {
@@ -201,9 +293,9 @@ int main(void) {
     return TEST_SKIPPED;
   }
   test_display_stop(&display);
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_levels), cmocka_unit_test(test_ten_bits),
-                                     cmocka_unit_test(test_window), cmocka_unit_test(test_pace),
-                                     cmocka_unit_test(test_manners)};
-  (void)resident_kib;
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_levels),  cmocka_unit_test(test_ten_bits),
+                                     cmocka_unit_test(test_window),  cmocka_unit_test(test_pace),
+                                     cmocka_unit_test(test_manners), cmocka_unit_test(test_live),
+                                     cmocka_unit_test(test_memory)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
