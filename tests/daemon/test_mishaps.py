@@ -13,7 +13,7 @@ import numpy
 
 from exhibit import exhibit, main, wait_for
 
-KILLS = 12
+KILLS = int(os.environ.get("CLT_KILLS", "12"))
 PTRACE_SEIZE, PTRACE_INTERRUPT, PTRACE_DETACH = 0x4206, 0x4207, 17
 
 
