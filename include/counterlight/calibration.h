@@ -49,7 +49,10 @@ typedef struct clt_calibration_info {
   double pitch;               /* panel pixels from one camera pixel to the next */
   long decoded;               /* camera pixels whose panel coordinate is known */
   double covered;             /* share of the panel's pixels that they see */
-  int64_t calibrated;         /* seconds since 1970-01-01 UTC */
+  /* The camera's lens, from photographs of a chessboard: fx fy cx cy, pixels, then Brown's k1 k2 p1 p2 k3, as OpenCV
+   * defines them, and the rms distance of corners from where the lens puts them, pixels. fx 0: not measured. */
+  double lens[9], lens_reprojection;
+  int64_t calibrated;               /* seconds since 1970-01-01 UTC */
   char source[CLT_MESSAGE_MAX / 4]; /* the devices, in words */
 } clt_calibration_info;
 

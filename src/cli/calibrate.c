@@ -19,6 +19,8 @@ static const cli_option options[] = {
     {"panel", 0, "WxH", "pictures: the panel's pixels (default 1280x720)"},
     {"response", 0, "CURVE", "pictures: the camera's: linear, srgb or gamma:G (default srgb)"},
     {"exposure-ms", 0, "X", "recorded pictures alone: exposure time of the frames to take (default: the longest)"},
+    {"lens", 0, "DIR", "photographs of a chessboard: put the camera's lens into the calibration of --output"},
+    {"board", 0, "CxR", "inner corners of that chessboard (default 9x6, as charts/chessboard-a4.svg)"},
     {NULL, 0, NULL, NULL},
 };
 
@@ -180,6 +182,9 @@ static void close_all(cli_calibrate *t) {
 static int run(const cli_command *command, const cli_arguments *arguments) {
   cli_calibrate t = {0};
   clt_error error = {0};
+  if (cli_value(command, arguments, "lens") != NULL) {
+    return cli_calibrate_lens(command, arguments);
+  }
   cli_progress_begin(&t.progress, arguments->quiet);
   clt_status status = read_options(command, arguments, &t, &error);
   if (!status) {
@@ -196,7 +201,7 @@ static int run(const cli_command *command, const cli_arguments *arguments) {
 
 const cli_command cli_command_calibrate = {
     .name = "calibrate",
-    .synopsis = "--config C | --scene S | --replay DIR [-o DIR] [options]",
+    .synopsis = "--config C | --scene S | --replay DIR | --lens DIR [-o DIR] [options]",
     .summary = "measure what a rig must know of its projector and camera, and say what is wrong",
     .options = options,
     .run = run,

@@ -29,4 +29,7 @@ clt_status cli_calibrate_geometry(cli_calibrate *task, clt_error *error);
 /* Calibrates on the station's devices, or on the recording of a whole calibration, into found.whole. */
 clt_status cli_calibrate_whole(cli_calibrate *task, clt_error *error);
 
+/* The lens by photographs of a chessboard, into a calibration that is there. An exit code. */
+int cli_calibrate_lens(const cli_command *command, const cli_arguments *arguments);
+
 #endif

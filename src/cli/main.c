@@ -6,12 +6,12 @@
 
 /* In the order in which --help lists them. */
 static const cli_command *const commands[] = {
-    &cli_command_demo,       &cli_command_doctor,    &cli_command_calibrate, &cli_command_acquire,
-    &cli_command_compensate, &cli_command_relight,   &cli_command_bounces,   &cli_command_separate,
-    &cli_command_repaint,    &cli_command_inspect,   &cli_command_tradeoff,  &cli_command_reproduce,
-    &cli_command_simulate,   &cli_command_scene,     &cli_command_bench,     &cli_command_status,
-    &cli_command_show,       &cli_command_watch,     &cli_command_reacquire, &cli_command_refine,
-    &cli_command_snapshot,   &cli_command_hold,      &cli_command_resume,    &cli_command_reload,
+    &cli_command_demo,       &cli_command_doctor,  &cli_command_calibrate, &cli_command_acquire,
+    &cli_command_compensate, &cli_command_relight, &cli_command_bounces,   &cli_command_separate,
+    &cli_command_repaint,    &cli_command_inspect, &cli_command_tradeoff,  &cli_command_reproduce,
+    &cli_command_simulate,   &cli_command_scene,   &cli_command_bench,     &cli_command_status,
+    &cli_command_show,       &cli_command_watch,   &cli_command_reacquire, &cli_command_refine,
+    &cli_command_snapshot,   &cli_command_hold,    &cli_command_resume,    &cli_command_reload,
 };
 enum { COMMANDS = sizeof commands / sizeof *commands };
 

@@ -147,6 +147,34 @@ static clt_status write_curves(const clt_hdf *hdf, const clt_calibration_info *i
   return status == CLT_OK ? write_doubles(hdf, "/black", channels, 0, info->black, error) : status;
 }
 
+/* The nine numbers of the lens, then its reprojection error; a file need not have them. */
+enum { LENS_NUMBERS = 9 };
+static clt_status read_lens(const clt_hdf *hdf, clt_calibration_info *info, clt_error *error) {
+  double values[LENS_NUMBERS + 1] = {0};
+  if (!clt_hdf_has(hdf, "/camera/lens")) {
+    return CLT_OK;
+  }
+  clt_status status = read_doubles(hdf, "/camera/lens", LENS_NUMBERS + 1, 0, values, error);
+  if (status == CLT_OK && !(values[0] > 0 && values[1] > 0 && values[LENS_NUMBERS] >= 0)) {
+    return clt_fail(error, CLT_BAD_INPUT,
+                    "%s: /camera/lens has focal lengths %g and %g and a reprojection error of %g; measure it again",
+                    hdf->path, values[0], values[1], values[LENS_NUMBERS]);
+  }
+  memcpy(info->lens, values, sizeof info->lens);
+  info->lens_reprojection = values[LENS_NUMBERS];
+  return status;
+}
+
+static clt_status write_lens(const clt_hdf *hdf, const clt_calibration_info *info, clt_error *error) {
+  double values[LENS_NUMBERS + 1];
+  if (!(info->lens[0] > 0)) {
+    return CLT_OK;
+  }
+  memcpy(values, info->lens, sizeof info->lens);
+  values[LENS_NUMBERS] = info->lens_reprojection;
+  return write_doubles(hdf, "/camera/lens", LENS_NUMBERS + 1, 0, values, error);
+}
+
 static clt_status read_exposures(const clt_hdf *hdf, clt_calibration_info *info, clt_error *error) {
   clt_hdf_array array = {.name = "/exposures", .type = H5T_NATIVE_DOUBLE, .rank = 1, .shape = {CLT_HDF_ANY}};
   clt_status status = clt_hdf_read(hdf, &array, error);
@@ -258,6 +286,7 @@ static clt_status read_all(const clt_hdf *hdf, clt_calibration *made, clt_error 
   status = status == CLT_OK ? clt_hdf_read_text(hdf, "source", info->source, sizeof info->source, error) : status;
   status = status == CLT_OK ? read_curves(hdf, info, error) : status;
   status = status == CLT_OK ? read_exposures(hdf, info, error) : status;
+  status = status == CLT_OK ? read_lens(hdf, info, error) : status;
   return status == CLT_OK ? read_map(hdf, made, error) : status;
 }
 
@@ -303,6 +332,7 @@ static clt_status write_all(const clt_calibration *calibration, const clt_hdf *h
       status == CLT_OK ? clt_hdf_write_number(hdf, "calibrated", H5T_NATIVE_INT64, &info->calibrated, error) : status;
   status = status == CLT_OK ? clt_hdf_write_text(hdf, "source", info->source, error) : status;
   status = status == CLT_OK ? write_curves(hdf, info, error) : status;
+  status = status == CLT_OK ? write_lens(hdf, info, error) : status;
   status = status == CLT_OK
                ? write_doubles(hdf, "/exposures", (size_t)info->exposure_count, 0, info->exposures_s, error)
                : status;

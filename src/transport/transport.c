@@ -3,8 +3,8 @@
 #include "base/memory.h"
 #include "transport/kind.h"
 
-const clt_kind *const clt_kinds[] = {
-    &clt_kind_dense, &clt_kind_dense64, &clt_kind_dense16, &clt_kind_dense8, &clt_kind_tree, &clt_kind_blocks, &clt_kind_hierarchy, NULL};
+const clt_kind *const clt_kinds[] = {&clt_kind_dense, &clt_kind_dense64, &clt_kind_dense16,   &clt_kind_dense8,
+                                     &clt_kind_tree,  &clt_kind_blocks,  &clt_kind_hierarchy, NULL};
 
 clt_status clt_transport_begin(const clt_kind *kind, int width, int height, int channels, const char *source,
                                clt_transport **out, clt_error *error) {
