@@ -24,7 +24,10 @@
 #include "solve/live.h"
 #include "transport/hierarchy.h"
 
-enum { CLT_LIVE_MOMENTS = 9 }; /* of a weight over a leaf: the sums with u^a v^b, a and b 0..2, at [3 b + a] */
+enum {
+  CLT_LIVE_AROUND = 8,
+  CLT_LIVE_MOMENTS = 9
+}; /* of a weight over a leaf: the sums with u^a v^b, a and b 0..2, at [3 b + a] */
 
 /* One channel of one leaf. */
 typedef struct clt_live_item {
@@ -57,14 +60,13 @@ struct clt_far {
   const clt_hierarchy_storage *hierarchy;
   const clt_live_kernels *kernels;
   int width;
-  size_t cells, values, items, rank; /* values: channels x cells */
-  clt_live_item *item;               /* channel by channel, leaf by leaf */
-  float *plane;                      /* the planes below, channels x cells each */
+  size_t cells, items, rank;
+  clt_live_item *item; /* channel by channel, leaf by leaf */
+  float *plane;        /* the planes below, channels x cells each */
   float *wanted, *residual, *inverse, *drive[3];
-  /* near light by directions, `directions` planes: T_ij at i for j = i + shift; NULL where some near entries join cells
-   * that are no neighbours. Drives have room for a shift before and behind them. */
-  int directions;
-  ptrdiff_t shift[9];
+  /* near light by the directions of the eight cells around a cell, in reading order: [row of cells, channel by channel]
+   * [direction][column]; NULL where some near entries join cells that are no neighbours. Drives have room for a row and
+   * a cell before and behind them. */
   float *spill;
   unsigned char *held, *factored; /* 1 where the projection holds a cell: now, and in the factor */
   bool open;                      /* no cell is taken to be held: a step from nothing goes for the unbounded drive */

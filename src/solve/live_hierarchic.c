@@ -91,7 +91,6 @@ static clt_status create(clt_live *live, clt_error *error) {
                    .kernels = clt_live_choose(),
                    .width = live->info.width,
                    .cells = live->info.cols,
-                   .values = values_of(live),
                    .items = hierarchy->leaves * (size_t)live->info.channels,
                    .rank = hierarchy->rank};
   clt_status status = reserve(live, far, error);

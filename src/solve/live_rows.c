@@ -47,15 +47,18 @@ INLINE float clip(float value) {
   return value < 1 ? value : 1;
 }
 
-/* near = O x over a row, by the planes of its directions. */
-INLINE void add_spill(const clt_far *far, place first, size_t values, int32_t width, float *restrict near) {
-  memset(near, 0, (size_t)width * sizeof *near);
-  for (int direction = 0; direction < far->directions; direction++) {
-    const float *restrict spill = far->spill + (size_t)direction * values + first.at;
-    const float *restrict x = far->drive[far->now] + (ptrdiff_t)first.at + far->shift[direction];
-    for (int32_t k = 0; k < width; k++) {
-      near[k] += spill[k] * x[k];
-    }
+/* near = O x over a row, by its eight directions. */
+INLINE void add_spill(const clt_far *far, place first, int32_t width, float *restrict near) {
+  const size_t line = (size_t)far->width, begin = first.at / line * line;
+  const float *restrict spill = far->spill + begin * CLT_LIVE_AROUND + (first.at - begin);
+  const float *restrict x = far->drive[far->now] + first.at, *restrict up = x - line, *restrict down = x + line;
+  for (int32_t k = 0; k < width; k++) {
+    const float above =
+        (spill[k] * up[k - 1] + spill[line + (size_t)k] * up[k]) + spill[2 * line + (size_t)k] * up[k + 1];
+    const float beside = spill[3 * line + (size_t)k] * x[k - 1] + spill[4 * line + (size_t)k] * x[k + 1];
+    const float below = (spill[5 * line + (size_t)k] * down[k - 1] + spill[6 * line + (size_t)k] * down[k]) +
+                        spill[7 * line + (size_t)k] * down[k + 1];
+    near[k] = (above + below) + beside;
   }
 }
 
@@ -100,7 +103,7 @@ INLINE void look_row(const clt_far *far, const clt_live_item *item, int32_t row,
   const float bounded = far->open ? 0.0f : 1.0f;
   float near[SIDE], lit[SIDE], want[SIDE], hold[SIDE];
   if (far->spill != NULL) {
-    add_spill(far, first, far->values, width, near);
+    add_spill(far, first, width, near);
   } else {
     add_near(far, item, first, width, near);
   }

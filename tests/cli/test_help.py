@@ -1,4 +1,5 @@
 """Every command describes itself, and refuses what it does not know with one line and exit code 2."""
+import json
 import subprocess
 import sys
 import unittest
@@ -47,6 +48,20 @@ class Help(unittest.TestCase):
             answer = run(*words)
             self.assertEqual((answer.returncode, answer.stdout), (2, ""), words)
             self.assertTrue(answer.stderr)
+
+
+class Bench(unittest.TestCase):
+    def test_json_has_what_scripts_read(self):
+        answer = run("bench", "--json", "--no-scaling", "--frames", "10")
+        self.assertEqual((answer.returncode, answer.stderr), (0, ""))
+        report = json.loads(answer.stdout)
+        self.assertGreater(report["bandwidth_gbs"], 0)
+        for kernel in report["kernels"]:
+            self.assertLessEqual({"name", "bytes", "ms", "fraction"}, set(kernel))
+        self.assertEqual((report["frame"]["cells"], report["frame"]["channels"]), (131072, 3))
+        self.assertLessEqual(report["frame"]["p50_ms"], report["frame"]["p99_ms"])
+        self.assertIn("report-jacobi-csr-f32", [peer["name"] for peer in report["peers"]])
+        self.assertEqual(report["scaling"], {"exponent": None, "points": []})
 
 
 if __name__ == "__main__":

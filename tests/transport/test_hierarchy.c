@@ -40,6 +40,7 @@ static void check_products(const clt_transport *transport, int channel, const do
 static void test_products(void **unused) {
   (void)unused;
   char folder[64], path[128];
+  snprintf(path, sizeof path, "%s/hierarchy.h5", test_folder(folder));
   for (uint64_t seed = 1; seed <= 4; seed++) {
     const size_case size = {seed % 2 ? 37 : 64, seed % 2 ? 22 : 12, 1 + (int)(seed % 3), 0};
     const size_t cells = (size_t)size.width * (size_t)size.height;
