@@ -43,26 +43,6 @@ static clt_status check_cells(const clt_block_storage *own, size_t cells, const 
   return CLT_OK;
 }
 
-static clt_status check_near(const clt_block_storage *own, size_t cells, size_t entries, const char *source,
-                             clt_error *error) {
-  for (size_t i = 0; i <= cells; i++) {
-    const int64_t least = i == 0 ? 0 : own->start[i - 1];
-    if (own->start[i] < least || own->start[i] > (int64_t)entries || (i == 0 && own->start[i] != 0) ||
-        (i == cells && own->start[i] != (int64_t)entries)) {
-      return clt_fail(error, CLT_BAD_INPUT,
-                      "%s: /blocks/start[%zu] is %lld; the starts ascend from 0 to the number of entries, %zu", source,
-                      i, (long long)own->start[i], entries);
-    }
-  }
-  for (size_t e = 0; e < entries; e++) {
-    if (own->cell[e] < 0 || (size_t)own->cell[e] >= cells) {
-      return clt_fail(error, CLT_BAD_INPUT, "%s: /blocks/cell[%zu] is %d; the cells are 0..%zu", source, e,
-                      own->cell[e], cells - 1);
-    }
-  }
-  return CLT_OK;
-}
-
 static clt_status begin(clt_transport *transport, size_t count, const char *source, clt_error *error) {
   clt_block_storage *own = clt_alloc(1, sizeof *own);
   if (own == NULL) {
@@ -82,7 +62,7 @@ static clt_status finish(clt_transport *transport, size_t entries, const char *s
   const size_t cells = transport->cols, channels = (size_t)transport->channels;
   clt_status status = check_cells(own, cells, source, error);
   if (status == CLT_OK) {
-    status = check_near(own, cells, entries, source, error);
+    status = clt_check_near(source, "/blocks", own->start, own->cell, cells, entries, error);
   }
   if (status != CLT_OK) {
     return status;

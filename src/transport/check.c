@@ -136,3 +136,23 @@ clt_status clt_check_deviations(const clt_values *values, clt_error *error) {
   }
   return CLT_OK;
 }
+
+clt_status clt_check_near(const char *source, const char *group, const int64_t *start, const int32_t *cell,
+                          size_t cells, size_t entries, clt_error *error) {
+  for (size_t i = 0; i <= cells; i++) {
+    const int64_t least = i == 0 ? 0 : start[i - 1];
+    if (start[i] < least || start[i] > (int64_t)entries || (i == 0 && start[i] != 0) ||
+        (i == cells && start[i] != (int64_t)entries)) {
+      return clt_fail(error, CLT_BAD_INPUT,
+                      "%s: %s/start[%zu] is %lld; the starts ascend from 0 to the number of entries, %zu", source,
+                      group, i, (long long)start[i], entries);
+    }
+  }
+  for (size_t e = 0; e < entries; e++) {
+    if (cell[e] < 0 || (size_t)cell[e] >= cells) {
+      return clt_fail(error, CLT_BAD_INPUT, "%s: %s/cell[%zu] is %d; the cells are 0..%zu", source, group, e, cell[e],
+                      cells - 1);
+    }
+  }
+  return CLT_OK;
+}

@@ -2,6 +2,8 @@
 #ifndef CLT_TRANSPORT_CHECK_H
 #define CLT_TRANSPORT_CHECK_H
 
+#include <stdint.h>
+
 #include "counterlight/transport.h"
 
 /* A named block of values, as messages speak of it: "room.h5: /dense[0, 3, 4] is NaN". */
@@ -21,5 +23,10 @@ clt_status clt_check_entries(const clt_values *values, clt_error *error);
 clt_status clt_check_rows(const clt_transport *transport, const char *source, const char *name, clt_error *error);
 /* Standard deviations: not negative, not NaN; infinite where a cell was never seen. */
 clt_status clt_check_deviations(const clt_values *values, clt_error *error);
+
+/* Compressed rows of a group: start has cells + 1 values that ascend from 0 to entries, cell has entries cells.
+ * CLT_BAD_INPUT names the first that is not so. */
+clt_status clt_check_near(const char *source, const char *group, const int64_t *start, const int32_t *cell,
+                          size_t cells, size_t entries, clt_error *error);
 
 #endif

@@ -61,26 +61,6 @@ static clt_status check_leaves(const clt_transport *transport, const char *sourc
   return CLT_OK;
 }
 
-static clt_status check_near(const clt_hierarchy_storage *own, size_t cells, size_t entries, const char *source,
-                             clt_error *error) {
-  for (size_t i = 0; i <= cells; i++) {
-    const int64_t least = i == 0 ? 0 : own->start[i - 1];
-    if (own->start[i] < least || own->start[i] > (int64_t)entries || (i == 0 && own->start[i] != 0) ||
-        (i == cells && own->start[i] != (int64_t)entries)) {
-      return clt_fail(error, CLT_BAD_INPUT,
-                      "%s: /hierarchy/start[%zu] is %lld; the starts ascend from 0 to the number of entries, %zu",
-                      source, i, (long long)own->start[i], entries);
-    }
-  }
-  for (size_t e = 0; e < entries; e++) {
-    if (own->cell[e] < 0 || (size_t)own->cell[e] >= cells) {
-      return clt_fail(error, CLT_BAD_INPUT, "%s: /hierarchy/cell[%zu] is %d; the cells are 0..%zu", source, e,
-                      own->cell[e], cells - 1);
-    }
-  }
-  return CLT_OK;
-}
-
 clt_status clt_hierarchic_begin(clt_transport *transport, size_t leaves, size_t rank, const char *source,
                                 clt_error *error) {
   clt_hierarchy_storage *own = clt_alloc(1, sizeof *own);
@@ -100,7 +80,7 @@ clt_status clt_hierarchic_finish(clt_transport *transport, size_t entries, const
   clt_hierarchy_storage *own = transport->storage;
   clt_status status = check_leaves(transport, source, error);
   if (status == CLT_OK) {
-    status = check_near(own, transport->cols, entries, source, error);
+    status = clt_check_near(source, "/hierarchy", own->start, own->cell, transport->cols, entries, error);
   }
   if (status != CLT_OK) {
     return status;

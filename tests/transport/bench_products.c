@@ -1,10 +1,10 @@
 /* What a product with dense storage takes, beside a plain read of the same bytes by the same threads in the same run.
  * Usage: bench_products [CELLS...]; the best of many. */
-#include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "base/clock.h"
+#include "tradeoff/bench/bench.h"
 #include "transport/kind.h"
 
 static const double SECONDS_PER_STORAGE = 2;
@@ -32,27 +32,6 @@ static clt_transport *make_even(const clt_kind *kind, size_t cells, clt_error *e
   return transport;
 }
 
-/* Adds up an array, each thread its part, in as many sums as keep the processor busy. */
-static uint64_t read_all(const uint64_t *words, size_t count) {
-  enum { LANES = 16 };
-  uint64_t whole = 0;
-#pragma omp parallel reduction(+ : whole)
-  {
-    const size_t threads = (size_t)omp_get_num_threads(), me = (size_t)omp_get_thread_num();
-    const size_t blocks = count / LANES;
-    uint64_t lane[LANES] = {0};
-    for (size_t k = blocks * me / threads; k < blocks * (me + 1) / threads; k++) {
-      for (size_t l = 0; l < LANES; l++) {
-        lane[l] += words[k * LANES + l];
-      }
-    }
-    for (size_t l = 0; l < LANES; l++) {
-      whole += lane[l];
-    }
-  }
-  return whole;
-}
-
 static void tell(const clt_transport *transport, const char *what, double best_s, double read_s) {
   const double bytes = (double)transport->kind->bytes(transport);
   printf("%6zu  %-8s  %-10s %7.1f MB %9.3f ms %6.1f GB/s %5.0f %% of the read\n", transport->cols,
@@ -74,7 +53,8 @@ static bool measure(const clt_kind *kind, size_t cells, clt_error *error) {
       x[j] = 1;
     }
     int64_t now_ns = clt_clock_ns();
-    right = read_all(transport->storage, kind->bytes(transport) / sizeof(uint64_t)) % 2 == 0; /* as all words are */
+    right =
+        clt_bench_read(transport->storage, kind->bytes(transport) / sizeof(uint64_t)) % 2 == 0; /* as all words are */
     read_s = least(read_s, now_ns);
     now_ns = clt_clock_ns();
     clt_transport_apply(transport, 0, x, y);

@@ -2,39 +2,12 @@
 #include <omp.h>
 #include <stdbool.h>
 
+#include "products.h"
 #include "smooth.h"
 #include "transport/hierarchy.h"
 
-static void assert_product(const double *ours, const double *entries, int cells, bool transposed, const double *in) {
-  for (int i = 0; i < cells; i++) {
-    double wanted = 0, size = 0;
-    for (int j = 0; j < cells; j++) {
-      const double term = in[j] * (transposed ? entries[(size_t)j * (size_t)cells + (size_t)i]
-                                              : entries[(size_t)i * (size_t)cells + (size_t)j]);
-      wanted += term;
-      size += fabs(term);
-    }
-    assert_near(ours[i], wanted, 1e-12 + 3e-6 * size);
-  }
-}
-
-static void check_products(const clt_transport *transport, int channel, const double *entries, uint64_t *state) {
-  const int cells = (int)clt_transport_describe(transport).cols;
-  double *x = random_vector((size_t)cells, state), *ours = random_vector((size_t)cells, state);
-  clt_transport_apply(transport, channel, x, ours);
-  assert_product(ours, entries, cells, false, x);
-  clt_transport_apply_transposed(transport, channel, x, ours);
-  assert_product(ours, entries, cells, true, x);
-  clt_transport_diagonal(transport, channel, ours);
-  for (int i = 0; i < cells; i++) {
-    assert_near(ours[i], entries[(size_t)i * (size_t)cells + (size_t)i], 3e-6);
-    x[i] = 1;
-  }
-  clt_transport_row_sums(transport, channel, ours);
-  assert_product(ours, entries, cells, false, x);
-  free(x);
-  free(ours);
-}
+/* Entries on the diagonal are .8 to 1.2: no looser than 3e-6 there. */
+static const allowance OFF_BY = {3e-6, 2.4e-6};
 
 /* As made and as read from a file; block 0 has no flux in every other room. */
 static void test_products(void **unused) {
@@ -55,8 +28,8 @@ static void test_products(void **unused) {
     assert_int_equal(clt_transport_describe(read).bytes, clt_transport_describe(made).bytes);
     assert_true(clt_transport_simplified(read) == clt_transport_simplified(made));
     for (int c = 0; c < size.channels; c++) {
-      check_products(made, c, room.entries + (size_t)c * cells * cells, &state);
-      check_products(read, c, room.entries + (size_t)c * cells * cells, &state);
+      check_products(made, c, room.entries + (size_t)c * cells * cells, OFF_BY, &state);
+      check_products(read, c, room.entries + (size_t)c * cells * cells, OFF_BY, &state);
     }
     clt_transport_destroy(made);
     clt_transport_destroy(read);

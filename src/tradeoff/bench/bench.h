@@ -2,6 +2,8 @@
 #ifndef CLT_TRADEOFF_BENCH_H
 #define CLT_TRADEOFF_BENCH_H
 
+#include <stdint.h>
+
 #include "counterlight/bench.h"
 
 /* The picture of frame `number` that T can show: under the drive (channels x cells, room) that is filled as well. */
@@ -16,5 +18,9 @@ clt_status clt_bench_frames(const clt_transport *transport, const clt_certificat
  * the far ones, each for its share of them. */
 clt_status clt_bench_jacobi(const clt_transport *transport, double target_error, clt_bench_peer *peer,
                             clt_error *error);
+
+/* Adds up an array, each thread its part, in as many sums as keep the processor busy: the plain read of memory that
+ * products are set beside. */
+uint64_t clt_bench_read(const uint64_t *words, size_t count);
 
 #endif

@@ -16,8 +16,7 @@ typedef struct trial {
   double times[KERNELS + 1][REPEATS];
 } trial;
 
-/* Adds up an array, each thread its part, in as many sums as keep the processor busy. */
-static uint64_t read_all(const uint64_t *words, size_t count) {
+uint64_t clt_bench_read(const uint64_t *words, size_t count) {
   enum { LANES = 16 };
   uint64_t whole = 0;
 #pragma omp parallel reduction(+ : whole)
@@ -46,7 +45,7 @@ static void transposed_all(const clt_transport *transport, const double *y, doub
 /* Returns the sum that was read, so that no compiler leaves the reading out. */
 static uint64_t run_turn(trial *own, const clt_transport *transport, const clt_transport *hierarchy, int turn) {
   int64_t since_ns = clt_clock_ns();
-  const uint64_t sum = read_all(own->words, READ_BYTES / sizeof *own->words);
+  const uint64_t sum = clt_bench_read(own->words, READ_BYTES / sizeof *own->words);
   own->times[KERNELS][turn] = clt_clock_since(since_ns);
   since_ns = clt_clock_ns();
   clt_transport_apply_all(transport, own->x, own->y);

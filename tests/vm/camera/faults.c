@@ -5,16 +5,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "../process.h"
 #include "camera.h"
-
-static int64_t now_ns(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
-}
 
 /* Open for writing too, so that a writer that leaves does not end it. */
 void faults_open(camera_faults *faults, const char *path) {
@@ -58,7 +52,7 @@ static void obey(camera_faults *faults, camera_controls *controls, char *line) {
     control->refused = word[0] == 'r';
   } else if (strcmp(word, "drift") == 0 && rest != NULL) {
     faults->drift = atof(rest);
-    faults->drift_from_ns = now_ns();
+    faults->drift_from_ns = process_now_ns();
   } else {
     fprintf(stderr, "camera: no command \"%s\"\n", word);
   }
@@ -79,5 +73,5 @@ void faults_take(camera_faults *faults, camera_controls *controls) {
 }
 
 double faults_sensitivity(const camera_faults *faults) {
-  return faults->drift == 0 ? 1 : exp(faults->drift * (double)(now_ns() - faults->drift_from_ns) * 1e-9);
+  return faults->drift == 0 ? 1 : exp(faults->drift * (double)(process_now_ns() - faults->drift_from_ns) * 1e-9);
 }

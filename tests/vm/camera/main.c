@@ -1,11 +1,10 @@
 #include <errno.h>
 #include <poll.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "../process.h"
 #include "camera.h"
 
 typedef struct camera {
@@ -21,19 +20,6 @@ typedef struct camera {
   bool sending;
   int64_t next_ns;
 } camera;
-
-static volatile sig_atomic_t leaving;
-
-static void on_signal(int number) {
-  (void)number;
-  leaving = 1;
-}
-
-static int64_t now_ns(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
-}
 
 static bool take_one(int *count) {
   bool any = *count > 0;
@@ -71,7 +57,7 @@ static void send_payload(camera *self) {
 
 /* A frame is sent when its exposure has ended, at the camera's rate. */
 static void pump(camera *self) {
-  int64_t now = now_ns(), period = INT64_C(1000000000) / self->options.rate_hz;
+  int64_t now = process_now_ns(), period = INT64_C(1000000000) / self->options.rate_hz;
   if (!self->sending && self->link.waiting > 0 && now >= self->next_ns && !self->faults.stalled) {
     if (!self->faults.frozen) {
       sensor_expose(&self->sensor, &self->controls, faults_sensitivity(&self->faults), self->frame);
@@ -106,19 +92,20 @@ static void mind_reset(camera *self) {
 }
 
 static int wait_ms(const camera *self) {
-  int64_t left = self->next_ns - now_ns();
+  int64_t left = self->next_ns - process_now_ns();
   if (self->link.waiting == 0 || self->faults.stalled) {
     return 1000;
   }
   return left > 0 ? (int)(left / 1000000) + 1 : 0;
 }
 
-static void turn(camera *self) {
+/* False where waiting is not possible. */
+static bool turn(camera *self) {
   struct pollfd watched[] = {{self->link.socket, POLLIN, 0}, {self->faults.fifo, POLLIN, 0}};
   mind_plug(self);
   watched[0].fd = self->link.socket;
   if (poll(watched, 2, wait_ms(self)) < 0 && errno != EINTR) {
-    leaving = 1;
+    return false;
   }
   if (watched[1].revents & POLLIN) {
     faults_take(&self->faults, &self->controls);
@@ -131,6 +118,7 @@ static void turn(camera *self) {
   if (self->link.socket >= 0) {
     pump(self);
   }
+  return true;
 }
 
 static bool read_options(int count, char **arguments, camera_options *options) {
@@ -175,11 +163,9 @@ int main(int count, char **arguments) {
             "usage: vm_camera [-p PORT] [-r HZ] [-w WIDTH] [-h HEIGHT] [-s SERIAL] [-l LIGHT] [-c FIFO] [-n SEED]\n");
     return 2;
   }
-  signal(SIGTERM, on_signal);
-  signal(SIGINT, on_signal);
-  signal(SIGPIPE, SIG_IGN);
+  process_heed_signals();
   self.link.socket = -1;
-  self.next_ns = now_ns();
+  self.next_ns = process_now_ns();
   controls_init(&self.controls);
   uvc_init(&self.stream, &self.options);
   faults_open(&self.faults, self.options.commands);
@@ -187,8 +173,7 @@ int main(int count, char **arguments) {
   if (self.frame == NULL || !sensor_open(&self.sensor, &self.options)) {
     return 1;
   }
-  while (!leaving) {
-    turn(&self);
+  while (!process_is_leaving() && turn(&self)) {
   }
   usb_unplug(&self.link);
   sensor_close(&self.sensor);

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 
+#include "../process.h"
 #include "camera.h"
 
 static const double SENSITIVITY = 20;                       /* of full scale, by a radiance of 1 in a second */
@@ -86,9 +86,7 @@ static void encode(double rgb[2][LIGHT_CHANNELS], uint8_t *yuyv) {
 }
 
 void sensor_expose(camera_sensor *sensor, const camera_controls *controls, double sensitivity, uint8_t *yuyv) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  int64_t end_ns = now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
+  int64_t end_ns = process_now_ns();
   double exposure_s = controls_value(controls, "exposure") * EXPOSURE_UNIT_S, scale = sensitivity;
   sensor->frames++;
   if (sensor->light.header != NULL) {

@@ -3,28 +3,14 @@
  * fifo COMMANDS: "save FILE" writes the exact radiance of every cell of the grid (.npy) under what is on the screen. */
 #include <fcntl.h>
 #include <poll.h>
-#include <signal.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "../process.h"
 #include "room.h"
 
 static const int64_t PERIOD_NS = 1000000000 / 60;
-static volatile sig_atomic_t leaving;
-
-static void on_signal(int number) {
-  (void)number;
-  leaving = 1;
-}
-
-static int64_t now_ns(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
-}
-
 static bool check(clt_status status, const clt_error *error) {
   if (status != CLT_OK) {
     fprintf(stderr, "room: %s\n", error->message);
@@ -45,7 +31,7 @@ static void obey(const room *of, char *text) {
 
 /* Commands that come before it is time for the next look. */
 static void wait_until(int fifo, int64_t when_ns, const room *of) {
-  for (int64_t left; !leaving && (left = when_ns - now_ns()) > 0;) {
+  for (int64_t left; !process_is_leaving() && (left = when_ns - process_now_ns()) > 0;) {
     struct pollfd watched = {fifo, POLLIN, 0};
     char text[4096];
     if (poll(&watched, 1, (int)((left + 999999) / 1000000)) > 0) {
@@ -59,9 +45,9 @@ static void wait_until(int fifo, int64_t when_ns, const room *of) {
 static void run(screen *seen, room *of, light_ring *ring, int fifo) {
   clt_error error = {0};
   bool first = true;
-  int64_t next_ns = now_ns();
-  while (!leaving) {
-    int64_t looked_ns = now_ns();
+  int64_t next_ns = process_now_ns();
+  while (!process_is_leaving()) {
+    int64_t looked_ns = process_now_ns();
     if ((screen_look(seen) || first) && check(room_light(of, seen->last, &error), &error)) {
       room_view(of, light_next(ring));
       light_publish(ring, looked_ns);
@@ -81,8 +67,7 @@ int main(int count, char **arguments) {
     fprintf(stderr, "usage: vm_room SCENE LIGHT COMMANDS\n");
     return 2;
   }
-  signal(SIGTERM, on_signal);
-  signal(SIGINT, on_signal);
+  process_heed_signals();
   int fifo = open(arguments[3], O_RDWR | O_NONBLOCK);
   bool ready = fifo >= 0 && screen_open(&seen) &&
                check(room_open(arguments[1], seen.width, seen.height, &of, &error), &error) &&
