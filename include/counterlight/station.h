@@ -36,6 +36,9 @@ CLT_PUBLIC clt_status clt_station_for_scene(const char *scene_path, clt_station_
 /* Reads a configuration file (docs/configuration.md); its section "daemon" is left to the daemon. */
 CLT_PUBLIC clt_status clt_station_read(const char *path, clt_station_config *config, clt_error *error);
 
+/* True where two configurations that were read name the same devices and settings. */
+CLT_PUBLIC bool clt_station_same(const clt_station_config *a, const clt_station_config *b);
+
 typedef struct clt_station {
   clt_scene *scene;             /* NULL where the devices are real */
   clt_calibration *calibration; /* NULL where there is none; one that the caller puts here becomes the station's */

@@ -169,5 +169,5 @@ const char *daemon_config_needs_restart(const daemon_config *running, const daem
   if (strcmp(running->group, wanted->group) != 0) {
     return "group";
   }
-  return memcmp(&running->station, &wanted->station, sizeof running->station) != 0 ? "the devices' sections" : NULL;
+  return clt_station_same(&running->station, &wanted->station) ? NULL : "the devices' sections";
 }
