@@ -173,7 +173,7 @@ static bool find_direction(clt_box *box, clt_models *models, bool model_gains, d
   return clt_dot(box->system->cols, box->gradient, box->direction) < 0;
 }
 
-/* The certificate looked at the white picture already: most of what R does is in it. */
+/* The certificate looked at the white picture and at what came of it: most of what R does is in them. */
 static void open_models(clt_models *models, clt_box *box) {
   clt_system *system = box->system;
   models->reciprocal = system->square && system->flux != NULL && system->reciprocity <= RECIPROCAL;
@@ -181,6 +181,7 @@ static void open_models(clt_models *models, clt_box *box) {
   if (models->reciprocal) {
     clt_reciprocal_open(&models->transport, box, BOX_VECTORS + CLT_SECANT_VECTORS);
     clt_reciprocal_learn(&models->transport, system->first_bounce, system->flood);
+    clt_reciprocal_learn(&models->transport, system->flood, system->reflood);
     clt_copy(system->cols, box->gradient, box->curved);
     cblas_dscal((blasint)system->cols, -1, box->curved, 1);
     clt_reciprocal_learn_transposed(&models->transport, box->residual, box->curved);

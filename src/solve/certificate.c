@@ -16,6 +16,7 @@ struct clt_certificate {
   clt_channel_certificate channel[CLT_CHANNELS_MAX];
   double *first_bounce, *flux; /* channels x cols */
   double *flood;               /* channels x rows: T 1 over lit cells */
+  double *reflood;             /* channels x rows: S times that; 0 where T is not square */
   unsigned char *lit;
   clt_model model[CLT_CHANNELS_MAX];
 };
@@ -265,6 +266,7 @@ static clt_status certify_channel(clt_certificate *certificate, clt_system *syst
     return CLT_OK;
   }
   certify_radius(system, channel);
+  clt_system_apply(system, certificate->flood + at, certificate->reflood + at);
   channel->norm_high = bound_norm(system);
   channel->reciprocity = clt_flux_weights(system, flux);
   clt_model_build(system, &certificate->model[c]);
@@ -283,10 +285,11 @@ clt_status clt_certify(const clt_transport *transport, clt_certificate **out, cl
   certificate->first_bounce = clt_alloc(values, sizeof(double));
   certificate->flux = clt_alloc(values, sizeof(double));
   certificate->flood = clt_alloc((size_t)info.channels * info.rows, sizeof(double));
+  certificate->reflood = clt_alloc((size_t)info.channels * info.rows, sizeof(double));
   certificate->lit = clt_alloc(values, 1);
   clt_status status = CLT_OK;
   if (certificate->first_bounce == NULL || certificate->flux == NULL || certificate->flood == NULL ||
-      certificate->lit == NULL) {
+      certificate->reflood == NULL || certificate->lit == NULL) {
     status = clt_fail(error, CLT_FAILED, "not enough memory for a certificate of %zu cells", info.cols);
   }
   if (status == CLT_OK) {
@@ -333,6 +336,7 @@ void clt_certificate_destroy(clt_certificate *certificate) {
   free(certificate->first_bounce);
   free(certificate->flux);
   free(certificate->flood);
+  free(certificate->reflood);
   free(certificate->lit);
   free(certificate);
 }
@@ -351,6 +355,10 @@ const double *clt_certificate_first_bounce(const clt_certificate *certificate, i
 
 const double *clt_certificate_flood(const clt_certificate *certificate, int channel) {
   return certificate->flood + (size_t)channel * certificate->rows;
+}
+
+const double *clt_certificate_reflood(const clt_certificate *certificate, int channel) {
+  return certificate->reflood + (size_t)channel * certificate->rows;
 }
 
 const double *clt_certificate_flux(const clt_certificate *certificate, int channel) {

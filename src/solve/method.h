@@ -110,6 +110,8 @@ double clt_flux_weights(clt_system *system, double *w);
 clt_channel_certificate clt_certificate_worst(const clt_certificate *certificate);
 /* T 1 over the lit cells of a channel, rows values. */
 const double *clt_certificate_flood(const clt_certificate *certificate, int channel);
+/* S times that, rows values; 0 where T is not square. */
+const double *clt_certificate_reflood(const clt_certificate *certificate, int channel);
 /* The small copy of S of a channel. */
 const clt_model *clt_certificate_model(const clt_certificate *certificate, int channel);
 /* True where the certificate was made for a transport of this shape. */

@@ -47,6 +47,7 @@ static void select_system(clt_solver *solver, int k) {
                     clt_certificate_lit(solver->certificate, k));
   system->flux = clt_certificate_flux(solver->certificate, k);
   system->flood = clt_certificate_flood(solver->certificate, k);
+  system->reflood = clt_certificate_reflood(solver->certificate, k);
   system->reciprocity = solver->systems > 1 ? clt_certificate_channel(solver->certificate, k)->reciprocity
                                             : clt_certificate_worst(solver->certificate).reciprocity;
 }

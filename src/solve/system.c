@@ -44,7 +44,7 @@ void clt_system_select(clt_system *system, int channel, const double *first_boun
   system->channel = channel;
   system->first_bounce = first_bounce;
   system->lit = lit;
-  system->flux = system->flood = NULL;
+  system->flux = system->flood = system->reflood = NULL;
   system->prepared = NULL;
   system->reciprocity = 0;
   system->wanted_norm = 0;

@@ -25,6 +25,7 @@ typedef struct clt_system {
   const double *first_bounce; /* F, cols values */
   const double *flux;         /* w, cols values; NULL while the certificate is being made */
   const double *flood;        /* S F, rows values: the light of every lit cell in full; NULL likewise */
+  const double *reflood;      /* S S F where T is square, else 0; rows values; NULL likewise */
   const unsigned char *lit;   /* cols values */
   double reciprocity;
   double tolerance; /* relative residual that solves will ask for: what a method prepares for */
