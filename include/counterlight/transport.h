@@ -83,12 +83,15 @@ typedef struct clt_block_parts {
 CLT_PUBLIC clt_status clt_transport_create_blocks(int width, int height, int channels, const clt_block_parts *parts,
                                                   clt_transport **out, clt_error *error);
 
-/* Makes a transport in "hierarchy" storage from one in "blocks" storage: near light as it is, far light by the leaves
- * of a block tree over which it varies bilinearly, so that a product reads little more than one number a cell, and
- * noise of the columns is smoothed. tolerance (0 or more, below 1): rms of a cell's light, all blocks together and
- * relative to its own, that a leaf may leave out; noise is not told by finer leaves either. Every row keeps its sum.
- * Black, flood, deviations and provenance are copied. Time and memory grow with the cells times the blocks.
- * CLT_BAD_INPUT for another storage. */
+/* Makes a transport in "hierarchy" storage: near light as it is, far light by the leaves of a block tree over which it
+ * varies bilinearly, so that a product reads little more than one number a cell, and noise is smoothed. Every row keeps
+ * its sum. Black, flood, deviations and provenance are copied. tolerance is 0 or more, below 1.
+ * From "blocks" storage: tolerance is the rms of a cell's light, all blocks together and relative to its own, that a
+ * leaf may leave out; noise is not told by finer leaves either. Time and memory grow with the cells times the blocks.
+ * From any other storage of a square T, by its rows: tolerance is the root of the sum of squares of the entries that
+ * are left out, relative to that of the diagonal, beyond what deviations tell of noise. Time grows with the square of
+ * the cells (some seconds at 3072). CLT_BAD_INPUT where rows are not the cells, and where far light does not vary
+ * evenly, so that a quarter of the entries would stand by themselves. */
 CLT_PUBLIC clt_status clt_transport_create_hierarchy(const clt_transport *from, double tolerance, clt_transport **out,
                                                      clt_error *error);
 /* Relative RMS by which products with a hierarchy differ from those with what it was made from: the worst of several

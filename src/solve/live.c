@@ -34,16 +34,24 @@ static void measure_white(clt_live *live) {
   live->white_norm = sqrt(sum);
 }
 
-/* The hierarchy, where the storage allows one. */
+/* The hierarchy, where T has one that is worth it. */
 static clt_status choose_form(clt_live *live, clt_error *error) {
-  static const double LEFT_OUT = 5e-3; /* by a leaf, of a cell's light */
+  static const double LEFT_OUT = 5e-3;                /* by a leaf, of a cell's light */
+  enum { WORTH_IT = 256, MOST = 32768, SMALLER = 3 }; /* cells, and cells; bytes of T by those of the hierarchy */
+  const clt_transport_info *info = &live->info;
+  const bool is_hierarchy = strcmp(info->storage, "hierarchy") == 0, is_blocks = strcmp(info->storage, "blocks") == 0;
+  clt_error why;
   clt_status status = CLT_OK;
-  if (strcmp(live->info.storage, "blocks") == 0) {
+  if (is_blocks) {
     status = clt_transport_create_hierarchy(live->transport, LEFT_OUT, &live->made, error);
-    live->transport = live->made;
+  } else if (!is_hierarchy && info->cols >= WORTH_IT && info->cols <= MOST &&
+             clt_transport_create_hierarchy(live->transport, LEFT_OUT, &live->made, &why) == CLT_OK &&
+             SMALLER * clt_transport_describe(live->made).bytes > info->bytes) {
+    clt_transport_destroy(live->made);
+    live->made = NULL;
   }
-  live->form =
-      live->made != NULL || strcmp(live->info.storage, "hierarchy") == 0 ? &clt_live_hierarchic : &clt_live_general;
+  live->transport = live->made != NULL ? live->made : live->transport;
+  live->form = live->made != NULL || is_hierarchy ? &clt_live_hierarchic : &clt_live_general;
   return status;
 }
 

@@ -1,11 +1,10 @@
 /* From blocks storage to a hierarchy. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/memory.h"
-#include "base/order.h"
 #include "transport/blocks.h"
+#include "transport/hierarchy_make.h"
 #include "transport/hierarchy_tree.h"
 
 typedef struct build {
@@ -130,91 +129,19 @@ static void fill_cells(build *job) {
   take_near(job);
 }
 
-static clt_status reserve(build *job, size_t entries, clt_error *error) {
-  clt_hierarchy_storage *own = job->own;
-  const size_t channels = (size_t)job->from->channels, cells = job->from->cols;
-  const size_t factor = channels * CLT_LEAF_TERMS * own->leaves;
-  own->left = clt_alloc(factor, own->rank * sizeof *own->left);
-  own->right = clt_alloc(factor, own->rank * sizeof *own->right);
-  own->scale = clt_alloc(channels * cells, sizeof *own->scale);
-  own->gather = clt_alloc(channels * cells, sizeof *own->gather);
-  own->own = clt_alloc(channels * cells, sizeof *own->own);
-  own->flood = clt_alloc(channels * cells, sizeof *own->flood);
-  own->start = clt_alloc(cells + 1, sizeof *own->start);
-  own->cell = clt_alloc(entries, sizeof *own->cell);
-  own->value = clt_alloc(entries * channels, sizeof *own->value);
-  const bool all = own->left != NULL && own->right != NULL && own->scale != NULL && own->gather != NULL &&
-                   own->own != NULL && own->flood != NULL && own->start != NULL && own->cell != NULL &&
-                   own->value != NULL;
-  return all ? CLT_OK : clt_fail(error, CLT_FAILED, "no memory for a hierarchy over %zu cells", cells);
-}
-
-/* What a light of 1 is in each channel: the median of what cells show of themselves. */
 static clt_status size_planes(build *job, clt_error *error) {
   const size_t cells = job->from->cols, count = job->blocks->count;
-  double *size = clt_alloc(job->planes.count, sizeof *size), *diagonal = clt_alloc(cells, sizeof *diagonal);
+  double *size = clt_alloc(job->planes.count, sizeof *size), *room = clt_alloc(cells, sizeof *room);
   job->planes.size = size;
-  for (size_t c = 0; size != NULL && diagonal != NULL && c < (size_t)job->from->channels; c++) {
-    clt_transport_diagonal(job->from, (int)c, diagonal);
-    clt_sort_doubles(diagonal, cells);
-    const double median = diagonal[cells / 2];
+  for (size_t c = 0; size != NULL && room != NULL && c < (size_t)job->from->channels; c++) {
+    const double own = clt_own_light(job->from, (int)c, room);
     for (size_t b = 0; b < count; b++) {
-      size[c * count + b] = median > 0 ? median : 1;
+      size[c * count + b] = own;
     }
   }
-  free(diagonal);
-  return size != NULL && diagonal != NULL
-             ? CLT_OK
-             : clt_fail(error, CLT_FAILED, "no memory for the columns of %zu blocks", count);
-}
-
-/* Every row's sum becomes that of the transport it was made from. */
-static clt_status match_floods(build *job, clt_error *error) {
-  const size_t cells = job->from->cols;
-  double *sums = clt_alloc(cells, 2 * sizeof *sums);
-  if (sums == NULL) {
-    return clt_fail(error, CLT_FAILED, "no memory for the row sums of %zu cells", cells);
-  }
-  for (int c = 0; c < job->from->channels; c++) {
-    clt_transport_row_sums(job->from, c, sums);
-    clt_transport_row_sums(job->to, c, sums + cells);
-    for (size_t i = 0; i < cells; i++) {
-      job->own->flood[(size_t)c * cells + i] = (float)(sums[i] - sums[cells + i]);
-    }
-  }
-  free(sums);
-  return CLT_OK;
-}
-
-/* ||(T' - T) x|| / ||T x|| of one drive over all channels; x, y and z hold a channel. */
-static double product_error(const build *job, const double *x, double *y, double *z) {
-  double apart = 0, whole = 0;
-  for (int c = 0; c < job->from->channels; c++) {
-    clt_transport_apply(job->from, c, x, y);
-    clt_transport_apply(job->to, c, x, z);
-    for (size_t i = 0; i < job->from->cols; i++) {
-      apart += (z[i] - y[i]) * (z[i] - y[i]);
-      whole += y[i] * y[i];
-    }
-  }
-  return whole > 0 ? sqrt(apart / whole) : 0;
-}
-
-/* The worst of drives that light bands of 3, 9, 27... cells, across and down. */
-static clt_status measure_error(build *job, clt_error *error) {
-  const size_t cells = job->from->cols, width = (size_t)job->from->width;
-  double *x = clt_alloc(cells, 3 * sizeof *x);
-  if (x == NULL) {
-    return clt_fail(error, CLT_FAILED, "no memory to compare products of %zu cells", cells);
-  }
-  for (size_t band = 3; band <= 2 * width; band *= 3) {
-    for (size_t j = 0; j < cells; j++) {
-      x[j] = (j % width / band + j / width / band) % 2 == 0 ? 1 : 0;
-    }
-    job->own->error = fmax(job->own->error, product_error(job, x, x + cells, x + 2 * cells));
-  }
-  free(x);
-  return CLT_OK;
+  free(room);
+  return size != NULL && room != NULL ? CLT_OK
+                                      : clt_fail(error, CLT_FAILED, "no memory for the columns of %zu blocks", count);
 }
 
 static clt_status build_hierarchy(build *job, double tolerance, clt_error *error) {
@@ -242,7 +169,10 @@ static clt_status build_hierarchy(build *job, double tolerance, clt_error *error
   job->own = job->to->storage;
   job->own->leaf = leaf;
   const size_t entries = near_entries(job);
-  status = reserve(job, entries, error);
+  status = clt_hierarchic_reserve_cells(job->to, error);
+  if (status == CLT_OK) {
+    status = clt_hierarchic_reserve_near(job->to, entries, error);
+  }
   if (status == CLT_OK) {
     fill_cells(job);
     status = factor_columns(job, error);
@@ -257,37 +187,9 @@ static clt_status build_hierarchy(build *job, double tolerance, clt_error *error
   return status == CLT_OK ? clt_hierarchic_finish(job->to, entries, "a hierarchy", error) : status;
 }
 
-clt_status clt_transport_create_hierarchy(const clt_transport *from, double tolerance, clt_transport **out,
-                                          clt_error *error) {
-  *out = NULL;
-  if (!(tolerance >= 0 && tolerance < 1)) {
-    return clt_fail(error, CLT_BAD_INPUT, "the tolerance of a hierarchy is %g; it is 0 or more and below 1", tolerance);
-  }
-  if (from->kind != &clt_kind_blocks) {
-    return clt_fail(error, CLT_BAD_INPUT, "a hierarchy is made from blocks storage, not from %s: acquire with blocks",
-                    from->kind->name);
-  }
-  build job = {.from = from, .blocks = from->storage};
-  clt_status status = clt_transport_begin(&clt_kind_hierarchy, from->width, from->height, from->channels, "a hierarchy",
-                                          &job.to, error);
-  if (status == CLT_OK) {
-    job.to->provenance = from->provenance;
-    status = build_hierarchy(&job, tolerance, error);
-  }
-  if (status == CLT_OK) {
-    status = clt_transport_copy_planes(from, job.to, error);
-  }
-  if (status == CLT_OK) {
-    status = match_floods(&job, error);
-  }
-  if (status == CLT_OK) {
-    status = measure_error(&job, error);
-  }
+clt_status clt_hierarchy_from_blocks(const clt_transport *from, double tolerance, clt_transport *to, clt_error *error) {
+  build job = {.from = from, .blocks = from->storage, .to = to};
+  clt_status status = build_hierarchy(&job, tolerance, error);
   free((void *)job.planes.size);
-  if (status != CLT_OK) {
-    clt_transport_destroy(job.to);
-    return status;
-  }
-  *out = job.to;
-  return CLT_OK;
+  return status;
 }
