@@ -148,6 +148,12 @@ typedef struct measure_progress {
   double seconds, left;
 } measure_progress;
 
+/* Frames of the camera since the daemon started, whatever rigs they were taken by. */
+typedef struct camera_frames {
+  long used;
+  long repeated, strange, torn; /* refused and taken again, as clt_rig_info tells them apart */
+} camera_frames;
+
 /* What came of refining; errors are ||y - target|| / ||target|| of photographs, noise is theirs. */
 typedef struct refinement {
   int photographs; /* 0: not refined */
@@ -180,6 +186,7 @@ typedef struct measure_result {
   char camera[32];  /* CALIBRATE: its driver */
   clt_rig_info rig; /* CALIBRATE; its texts are the two below */
   char response[32], source[CLT_TEXT_MAX];
+  camera_frames frames;
   clt_transport *transport; /* ACQUIRE, PHOTOMETRY, CHANGED, GEOMETRY; NULL: the one in use fits */
   renewal renewed;          /* PHOTOMETRY, CHANGED, GEOMETRY */
   clt_image observation;    /* VERIFY, REFINE: radiance */

@@ -166,9 +166,15 @@ static json_t *devices_note(const control_findings *found) {
     return json_null();
   }
   const clt_projector_info *panel = &found->devices.projector;
-  return json_pack("{s:s, s:o, s:o, s:[i, i], s:f}", "projector", found->devices.projector_name, "camera",
-                   text_or_null(found->camera), "source", text_or_null(found->source), "panel", panel->width,
-                   panel->height, "refresh_hz", panel->refresh_s > 0 ? 1 / panel->refresh_s : 0.0);
+  json_t *note = json_pack("{s:s, s:o, s:o, s:[i, i], s:f}", "projector", found->devices.projector_name, "camera",
+                           text_or_null(found->camera), "source", text_or_null(found->source), "panel", panel->width,
+                           panel->height, "refresh_hz", panel->refresh_s > 0 ? 1 / panel->refresh_s : 0.0);
+  const camera_frames *frames = &found->camera_frames;
+  json_object_set_new(note, "frames",
+                      json_pack("{s:I, s:I, s:I, s:I}", "used", (json_int_t)frames->used, "repeated",
+                                (json_int_t)frames->repeated, "strange", (json_int_t)frames->strange, "torn",
+                                (json_int_t)frames->torn));
+  return note;
 }
 
 json_t *control_status(const control *self) {
