@@ -27,6 +27,7 @@
 #include "base/mailbox.h"
 #include "counterlight/counterlight.h"
 #include "daemon/model.h"
+#include "daemon/player.h"
 
 typedef struct daemon_boxes {
   clt_mailbox *orders;       /* control -> main: output_order */
@@ -68,13 +69,13 @@ typedef struct output_drive {
   uint64_t serial; /* of its content */
 } output_drive;
 
-/* A moving picture to show from now on, unless a drive for newer content is there. Its arrays are the letter's. */
+/* A moving picture to show from now on, unless a drive for newer content is there. */
 typedef struct output_moving {
   uint64_t serial; /* of its content */
   clt_live_picture picture;
-  uint8_t *content;
-  float *fields;                    /* gain, then offset */
-  size_t content_room, fields_room; /* bytes */
+  player_codes *content; /* held */
+  float *fields;         /* gain, then offset */
+  size_t fields_room;    /* bytes */
 } output_moving;
 
 /* A picture of panel codes to show at once and until the next pattern; without codes: measuring has ended, the drive
