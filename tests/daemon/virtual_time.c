@@ -1,11 +1,13 @@
-/* Time that does not pass while everybody waits, for a daemon that runs for hours: preloaded, it takes the place of
- * what the daemon waits with. Waiting costs nothing: when every thread waits, the clock jumps to the earliest deadline.
- * Work takes the time that it takes, but little of a stall counts, so that a busy machine makes nothing late. What is
- * late by this clock is late because a thread waited for another one, or slept, where it must not.
+/* Time that passes by waiting alone, for a daemon that runs for hours: preloaded, it takes the place of what the daemon
+ * waits with. When every thread waits, the clock jumps to the earliest deadline; until then nobody's comes. Work takes
+ * no time but for the thread that does it, which counts what it had of the processor, so that a busy machine makes
+ * nothing late. What is late by this clock is late because a thread waited for another one, or slept, where it must
+ * not, or worked too long itself.
  *
  * A thread counts from the first time that it waits here on, the main one from the start. Condition variables are kept
  * here alone: whoever is woken counts as busy from that moment, not from when it runs. One epoll set is looked into
  * before each jump. */
+#include <dlfcn.h>
 #include <errno.h>
 #include <limits.h>
 #include <poll.h>
@@ -19,8 +21,6 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Of work between two events of the clock, ns: what counts in full; of the rest, one part in so many counts. */
-enum { WORK_NS = 4000000, STALL_PARTS = 256 };
 enum { TIMERS = 8 };
 static const int64_t never_ns = INT64_MAX;
 
@@ -28,7 +28,7 @@ typedef struct waiter {
   struct waiter *next;
   const void *what; /* a condition variable; NULL: it sleeps */
   int64_t deadline_ns;
-  bool woken, late;
+  bool late;
   sem_t wake;
 } waiter;
 
@@ -39,7 +39,8 @@ typedef struct timer {
 
 static struct {
   pthread_mutex_t lock;
-  int64_t base_ns, real_ns; /* the clock at its last event, and the machine's then */
+  int64_t now_ns; /* by what was waited for */
+  uint64_t jumps;
   waiter *first;
   int busy;  /* threads that do not wait */
   int epoll; /* the set that is looked into */
@@ -61,39 +62,21 @@ static int64_t machine_ns(clockid_t clock) {
   return in_ns(&now);
 }
 
-static int64_t now_ns(void) {
-  int64_t real_ns = machine_ns(CLOCK_MONOTONIC);
-  if (world.real_ns == 0) {
-    world.base_ns = world.real_ns = real_ns;
+/* The thread's own time: never before what it saw last. Under the lock. */
+static int64_t own_ns(void) {
+  static _Thread_local int64_t seen_ns, processor_ns;
+  static _Thread_local uint64_t jumps;
+  int64_t now_ns = machine_ns(CLOCK_THREAD_CPUTIME_ID);
+  if (world.now_ns == 0) {
+    world.now_ns = machine_ns(CLOCK_MONOTONIC);
   }
-  int64_t passed_ns = real_ns - world.real_ns, stall_ns = passed_ns - WORK_NS;
-  return world.base_ns + (stall_ns > 0 ? WORK_NS + stall_ns / STALL_PARTS : passed_ns);
-}
-
-static void forget_thread(void *unused) {
-  (void)unused;
-  pthread_mutex_lock(&world.lock);
-  world.busy--;
-  pthread_mutex_unlock(&world.lock);
-}
-
-static void make_key(void) {
-  pthread_key_create(&world.threads, forget_thread);
-}
-
-/* Under the lock. */
-static void count_thread(void) {
-  static pthread_once_t once = PTHREAD_ONCE_INIT;
-  if (!counted) {
-    pthread_once(&once, make_key);
-    pthread_setspecific(world.threads, &world);
-    counted = true;
-    world.busy++;
+  if (jumps != world.jumps) {
+    jumps = world.jumps;
+    processor_ns = now_ns;
   }
-}
-
-__attribute__((constructor)) static void begin(void) {
-  count_thread();
+  int64_t own_ns = world.now_ns + now_ns - processor_ns;
+  seen_ns = own_ns > seen_ns ? own_ns : seen_ns;
+  return seen_ns;
 }
 
 static void wake(waiter *one, bool late) {
@@ -102,7 +85,6 @@ static void wake(waiter *one, bool late) {
     at = &(*at)->next;
   }
   *at = one->next;
-  one->woken = true;
   one->late = late;
   world.busy++;
   sem_post(&one->wake);
@@ -127,17 +109,16 @@ static void fire(timer *due) {
 }
 
 static void advance(int64_t to_ns) {
-  int64_t passed_ns = now_ns();
-  world.base_ns = to_ns > passed_ns ? to_ns : passed_ns;
-  world.real_ns = machine_ns(CLOCK_MONOTONIC);
+  world.now_ns = to_ns > world.now_ns ? to_ns : world.now_ns;
+  world.jumps++;
   for (waiter *one = world.first, *next; one != NULL; one = next) {
     next = one->next;
-    if (one->deadline_ns <= world.base_ns) {
+    if (one->deadline_ns <= world.now_ns) {
       wake(one, true);
     }
   }
   for (int i = 0; i < world.timer_count; i++) {
-    if (world.timers[i].deadline_ns <= world.base_ns) {
+    if (world.timers[i].deadline_ns <= world.now_ns) {
       fire(&world.timers[i]);
     }
   }
@@ -170,20 +151,31 @@ static void jump(void) {
   }
 }
 
-/* While others work, the time until the deadline is real. Under the lock, which is free meanwhile. */
-static void sleep_until_woken(waiter *self) {
-  while (!self->woken) {
-    int64_t until_ns =
-        self->deadline_ns == never_ns ? never_ns : machine_ns(CLOCK_MONOTONIC) + self->deadline_ns - now_ns();
-    const struct timespec until = {until_ns / 1000000000, until_ns % 1000000000};
-    pthread_mutex_unlock(&world.lock);
-    int outcome = until_ns == never_ns ? sem_wait(&self->wake) : sem_clockwait(&self->wake, CLOCK_MONOTONIC, &until);
-    bool expired = outcome != 0 && errno == ETIMEDOUT;
-    pthread_mutex_lock(&world.lock);
-    if (expired && !self->woken) {
-      advance(self->deadline_ns);
-    }
+static void forget_thread(void *unused) {
+  (void)unused;
+  pthread_mutex_lock(&world.lock);
+  world.busy--;
+  jump();
+  pthread_mutex_unlock(&world.lock);
+}
+
+static void make_key(void) {
+  pthread_key_create(&world.threads, forget_thread);
+}
+
+/* Under the lock. */
+static void count_thread(void) {
+  static pthread_once_t once = PTHREAD_ONCE_INIT;
+  if (!counted) {
+    pthread_once(&once, make_key);
+    pthread_setspecific(world.threads, &world);
+    counted = true;
+    world.busy++;
   }
+}
+
+__attribute__((constructor)) static void begin(void) {
+  count_thread();
 }
 
 /* True where the deadline came first. */
@@ -202,7 +194,10 @@ static bool wait_here(const void *what, pthread_mutex_t *held, int64_t deadline_
     pthread_mutex_unlock(held);
   }
   jump();
-  sleep_until_woken(&self);
+  pthread_mutex_unlock(&world.lock);
+  while (sem_wait(&self.wake) != 0) {
+  }
+  pthread_mutex_lock(&world.lock); /* whoever woke it is through with it */
   pthread_mutex_unlock(&world.lock);
   sem_destroy(&self.wake);
   if (held != NULL) {
@@ -229,7 +224,7 @@ int clock_gettime(clockid_t clock, struct timespec *out) {
     return (int)syscall(SYS_clock_gettime, clock, out);
   }
   pthread_mutex_lock(&world.lock);
-  int64_t ns = now_ns();
+  int64_t ns = own_ns();
   pthread_mutex_unlock(&world.lock);
   *out = (struct timespec){ns / 1000000000, ns % 1000000000};
   return 0;
@@ -274,6 +269,22 @@ int nanosleep(const struct timespec *length, struct timespec *left) {
   (void)left;
   wait_here(NULL, NULL, now_by_our_clock() + in_ns(length));
   return 0;
+}
+
+/* Who waits for another thread's end does not work. */
+int pthread_join(pthread_t thread, void **result) {
+  int (*join)(pthread_t, void **) = NULL;
+  *(void **)&join = dlsym(RTLD_NEXT, "pthread_join");
+  pthread_mutex_lock(&world.lock);
+  count_thread();
+  world.busy--;
+  jump();
+  pthread_mutex_unlock(&world.lock);
+  int outcome = join(thread, result);
+  pthread_mutex_lock(&world.lock);
+  world.busy++;
+  pthread_mutex_unlock(&world.lock);
+  return outcome;
 }
 
 int timerfd_settime(int descriptor, int flags, const struct itimerspec *wanted, struct itimerspec *before) {
