@@ -159,6 +159,7 @@ static void count(mover *self, int64_t start_ns, bool fresh, int skipped) {
             self->job->frames.live.budget_ms);
   }
   found->ms = 1e-6 * (double)(now_ns - start_ns);
+  found->slow += fresh && found->ms > 1e3 * refresh_s(self);
   found->compensated = self->frames != NULL;
 }
 
