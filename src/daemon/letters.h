@@ -271,6 +271,7 @@ typedef struct moving_report {
   uint64_t serial;                /* of the content */
   uint64_t frames, late, skipped; /* of the film: shown; ready more than a refresh after they were due; passed over */
   uint64_t slow;                  /* took longer than a refresh */
+  uint64_t slipped;               /* since the film began: decoded after they were due */
   uint64_t direct;                /* compensated, with no time for a step (clt_frames_result) */
   double fps;                     /* over the last report's time */
   bool compensated;

@@ -49,6 +49,7 @@ static void report(mover *self) {
   if (letter == NULL) {
     return;
   }
+  self->found.slipped = player_slipped(self->playing);
   self->found.fps = (double)(self->found.frames - self->reported.frames) / passed;
   self->reported = self->found;
   self->reported_ns = clt_clock_ns();

@@ -31,7 +31,8 @@ struct player {
   int first, count;
   player_codes *pool[POOL]; /* held; used again where nobody else holds them */
   bool stopping;
-  int64_t next_ns;   /* when the next frame is due; 0: at once */
+  int64_t next_ns; /* when the next frame is due; 0: at once */
+  uint64_t slipped;
   clt_error problem; /* of the last try */
 };
 
@@ -83,6 +84,7 @@ static void append(player *self, player_codes *codes, const clt_film_frame *shap
   made->codes = codes;
   made->shape = *shape;
   made->due_ns = self->next_ns > now_ns ? self->next_ns : now_ns;
+  self->slipped += self->next_ns > 0 && self->next_ns < now_ns;
   self->next_ns = made->due_ns + (isfinite(shape->seconds) ? llround(1e9 * shape->seconds) : 0);
   self->count++;
 }
@@ -199,6 +201,13 @@ double player_due(player *self) {
   double left = self->count > 0 ? 1e-9 * (double)(self->slots[self->first].due_ns - clt_clock_ns()) : INFINITY;
   pthread_mutex_unlock(&self->lock);
   return left > 0 ? left : 0;
+}
+
+uint64_t player_slipped(player *self) {
+  pthread_mutex_lock(&self->lock);
+  uint64_t slipped = self->slipped;
+  pthread_mutex_unlock(&self->lock);
+  return slipped;
 }
 
 bool player_failed(player *self, clt_error *error) {

@@ -37,6 +37,8 @@ void player_destroy(player *self); /* accepts NULL */
 bool player_take(player *self, int64_t until_ns, player_frame *frame, int *skipped);
 /* Seconds from now until the next decoded frame is due (0: it is; infinite: none is decoded). */
 double player_due(player *self);
+/* How many frames were decoded only after they were due, so that the film waited for them. */
+uint64_t player_slipped(player *self);
 /* Why the film stands still; false where it does not. */
 bool player_failed(player *self, clt_error *error);
 

@@ -114,9 +114,9 @@ json_t *control_moving_note(const control *self) {
   if (moved->serial != self->found.content_serial || self->work.playing.path[0] == '\0') {
     return json_null();
   }
-  json_t *note = json_pack("{s:I, s:I, s:I, s:I, s:f, s:b, s:f}", "frames", (json_int_t)moved->frames, "late",
+  json_t *note = json_pack("{s:I, s:I, s:I, s:I, s:I, s:f, s:b, s:f}", "frames", (json_int_t)moved->frames, "late",
                            (json_int_t)moved->late, "slow", (json_int_t)moved->slow, "skipped",
-                           (json_int_t)moved->skipped, "fps", moved->fps,
+                           (json_int_t)moved->skipped, "slipped", (json_int_t)moved->slipped, "fps", moved->fps,
                            "compensated", moved->compensated, "ms", moved->ms);
   if (moved->compensated) {
     json_object_set_new(note, "direct", json_integer((json_int_t)moved->direct));
