@@ -275,8 +275,9 @@ typedef struct moving_report {
   uint64_t direct;                /* compensated, with no time for a step (clt_frames_result) */
   double fps;                     /* over the last report's time */
   bool compensated;
-  double ms;              /* that the last frame took */
-  clt_frames_result last; /* of that, where it is compensated */
+  char why[CLT_MESSAGE_MAX]; /* the film stands still; empty where it does not */
+  double ms;                 /* that the last frame took */
+  clt_frames_result last;    /* of that, where it is compensated */
 } moving_report;
 
 /* Deep copy; `to` is overwritten. CLT_FAILED where memory is short (then `to` is empty). */

@@ -1,6 +1,7 @@
 #include "daemon/moving.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -43,6 +44,18 @@ static void stop_playing(mover *self) {
   self->job = NULL;
 }
 
+/* Says once that the film stands still, and that it goes on. */
+static void follow_film(mover *self) {
+  clt_error problem = {0};
+  bool stands = player_failed(self->playing, &problem), stood = self->found.why[0] != '\0';
+  if (stands && !stood) {
+    clt_log(CLT_LOG_ERROR, "what moves stands still: %s", problem.message);
+  } else if (stood && !stands) {
+    clt_log(CLT_LOG_NOTICE, "what moves goes on");
+  }
+  snprintf(self->found.why, sizeof self->found.why, "%s", stands ? problem.message : "");
+}
+
 static void report(mover *self) {
   double passed = clt_clock_since(self->reported_ns);
   moving_report *letter = passed >= report_s ? clt_alloc(1, sizeof *letter) : NULL;
@@ -50,6 +63,7 @@ static void report(mover *self) {
     return;
   }
   self->found.slipped = player_slipped(self->playing);
+  follow_film(self);
   self->found.fps = (double)(self->found.frames - self->reported.frames) / passed;
   self->reported = self->found;
   self->reported_ns = clt_clock_ns();
@@ -64,6 +78,7 @@ static void take_job(mover *self, moving_job *job) {
                  self->job->projector.width == job->projector.width &&
                  self->job->projector.height == job->projector.height;
   player *kept = goes_on ? self->playing : NULL;
+  const moving_report before = self->found;
   if (!goes_on) {
     player_codes_drop(self->frame.codes);
     self->frame = (player_frame){0};
@@ -78,6 +93,7 @@ static void take_job(mover *self, moving_job *job) {
                   .seed = self->seed,
                   .reported_ns = clt_clock_ns()};
   self->found.serial = job->serial;
+  snprintf(self->found.why, sizeof self->found.why, "%s", goes_on ? before.why : "");
   clt_film_options options = {job->projector.width, job->projector.height, job->picture_s};
   clt_status status = CLT_OK;
   if (job->path[0] != '\0' && kept == NULL) {

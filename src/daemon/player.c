@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "daemon/input.h"
 
 /* Frames decoded ahead; and all that there may be, with those that are decoded into, worked on, on their way and shown.
  */
@@ -33,6 +34,7 @@ struct player {
   bool stopping;
   int64_t next_ns; /* when the next frame is due; 0: at once */
   uint64_t slipped;
+  bool live;         /* an input: frames are due as they come */
   clt_error problem; /* of the last try */
 };
 
@@ -77,15 +79,27 @@ static player_codes *free_codes(player *self) {
   return NULL;
 }
 
-/* Puts a decoded frame behind the others. One that comes later than the next refreshes could show moves the film. */
+/* Of an input whose pictures are not taken the oldest goes. */
+static void make_room(player *self) {
+  if (self->count == SLOTS) {
+    player_codes_drop(self->slots[self->first].codes);
+    self->first = (self->first + 1) % SLOTS;
+    self->count--;
+  }
+}
+
+/* Puts a decoded frame behind the others. One that comes later than the next refreshes could show moves the film; those
+ * of an input are due as they come. */
 static void append(player *self, player_codes *codes, const clt_film_frame *shape) {
+  make_room(self);
   slot *made = &self->slots[(self->first + self->count) % SLOTS];
   int64_t now_ns = clt_clock_ns();
   made->codes = codes;
   made->shape = *shape;
   made->due_ns = self->next_ns > now_ns ? self->next_ns : now_ns;
   self->slipped += self->next_ns > 0 && self->next_ns < now_ns;
-  self->next_ns = made->due_ns + (isfinite(shape->seconds) ? llround(1e9 * shape->seconds) : 0);
+  self->live = shape->seconds == 0;
+  self->next_ns = self->live ? 0 : made->due_ns + (isfinite(shape->seconds) ? llround(1e9 * shape->seconds) : 0);
   self->count++;
 }
 
@@ -124,7 +138,7 @@ static void *decode(void *data) {
   bool more = true;
   pthread_mutex_lock(&self->lock);
   while (more && !self->stopping) {
-    if (self->count < SLOTS) {
+    if (self->count < SLOTS || self->live) {
       more = decode_one(self);
     } else {
       pthread_cond_wait(&self->changed, &self->lock);
@@ -146,7 +160,7 @@ clt_status player_create(const char *path, const clt_film_options *options, play
   }
   pthread_mutex_init(&self->lock, NULL);
   pthread_cond_init(&self->changed, NULL);
-  clt_status status = clt_film_open(path, options, &self->film, error);
+  clt_status status = input_film(path, options, &self->film, error);
   status = status == CLT_OK ? start(self, error) : status;
   if (status != CLT_OK) {
     player_destroy(self);

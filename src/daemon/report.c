@@ -118,6 +118,7 @@ json_t *control_moving_note(const control *self) {
                            (json_int_t)moved->late, "slow", (json_int_t)moved->slow, "skipped",
                            (json_int_t)moved->skipped, "slipped", (json_int_t)moved->slipped, "fps", moved->fps,
                            "compensated", moved->compensated, "ms", moved->ms);
+  json_object_set_new(note, "why", text_or_null(moved->why));
   if (moved->compensated) {
     json_object_set_new(note, "direct", json_integer((json_int_t)moved->direct));
     json_object_set_new(note, "error", last->direct ? json_null() : json_real(last->live.error));
