@@ -20,7 +20,10 @@ typedef struct clt_rig_info {
   const char *source;          /* what is observed, in words: the scene or the devices */
   long patterns, frames;       /* shown and used since the rig was opened */
   long doubted;                /* patterns whose exposures contradicted each other at first */
-  double seconds;              /* on the devices' clock, when the last frame began */
+  /* Frames that were refused and taken again: they repeated the one before, were of another picture, or contradicted
+   * the other exposures of theirs. */
+  long repeated, strange, torn;
+  double seconds; /* on the devices' clock, when the last frame began */
 } clt_rig_info;
 
 typedef struct clt_rig_operations {

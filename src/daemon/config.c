@@ -8,7 +8,7 @@
 #include "base/file.h"
 #include "base/places.h"
 #include "base/settings.h"
-#include "image/film.h"
+#include "daemon/input.h"
 
 enum { METHOD_NAMES_MOST = 48 };
 
@@ -146,7 +146,7 @@ clt_status daemon_config_read(const char *path, const daemon_overrides *override
 clt_status daemon_config_check(const daemon_config *config, clt_error *error) {
   clt_image picture = {0};
   clt_station station = {0};
-  clt_status status = clt_film_poster(config->content, &picture, error);
+  clt_status status = input_poster(config->content, &picture, error);
   clt_image_finish(&picture);
   status = status == CLT_OK ? clt_station_open(&config->station, &station, error) : status;
   status = status == CLT_OK ? clt_station_open_rig(&config->station, &station, NULL, error) : status;

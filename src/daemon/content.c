@@ -10,7 +10,7 @@
 
 #include "base/file.h"
 #include "base/log.h"
-#include "image/film.h"
+#include "daemon/input.h"
 
 static const off_t file_most = (off_t)256 * 1024 * 1024;
 
@@ -143,7 +143,7 @@ clt_status content_take(const store *state, const char *configured, int descript
 
 clt_status content_reset(const store *state, const char *configured, content *shown, clt_error *error) {
   clt_image picture = {0};
-  clt_status status = clt_film_poster(configured, &picture, error);
+  clt_status status = input_poster(configured, &picture, error);
   if (status != CLT_OK) {
     return status;
   }

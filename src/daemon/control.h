@@ -49,7 +49,8 @@ typedef struct control_work {
 typedef struct control_findings {
   bool open; /* the projector is */
   output_opened devices;
-  char camera[32];             /* its driver; empty while it is not open */
+  char camera[32]; /* its driver; empty while it is not open */
+  camera_frames camera_frames;
   bool calibrated;             /* what follows is known */
   int width, height, channels; /* of the grid */
   char response[32], source[CLT_TEXT_MAX];

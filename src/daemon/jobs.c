@@ -207,7 +207,22 @@ static void take_measured(control *self, measure_result *letter) {
   }
 }
 
+/* Frames that were refused did no harm; many of them say that a cable or a driver is bad. */
+static void take_camera_frames(control *self, const camera_frames *now) {
+  camera_frames before = self->found.camera_frames;
+  long repeated = now->repeated - before.repeated, strange = now->strange - before.strange,
+       torn = now->torn - before.torn;
+  self->found.camera_frames = *now;
+  if (repeated + strange + torn > 0) {
+    clt_log(CLT_LOG_NOTICE,
+            "beside %ld frames of the camera others were refused: %ld repeated the one before, %ld were of another "
+            "picture, %ld contradicted the others",
+            now->used - before.used, repeated, strange, torn);
+  }
+}
+
 void control_on_measured(control *self, measure_result *letter) {
+  take_camera_frames(self, &letter->frames);
   if (letter->number != self->work.measure_number) {
     return;
   }

@@ -109,7 +109,7 @@ void output_pattern_free(void *letter) {
 void output_moving_free(void *letter) {
   output_moving *gone = letter;
   if (gone != NULL) {
-    free(gone->content);
+    player_codes_drop(gone->content);
     free(gone->fields);
     free(gone);
   }

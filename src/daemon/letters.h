@@ -27,6 +27,7 @@
 #include "base/mailbox.h"
 #include "counterlight/counterlight.h"
 #include "daemon/model.h"
+#include "daemon/player.h"
 
 typedef struct daemon_boxes {
   clt_mailbox *orders;       /* control -> main: output_order */
@@ -68,13 +69,13 @@ typedef struct output_drive {
   uint64_t serial; /* of its content */
 } output_drive;
 
-/* A moving picture to show from now on, unless a drive for newer content is there. Its arrays are the letter's. */
+/* A moving picture to show from now on, unless a drive for newer content is there. */
 typedef struct output_moving {
   uint64_t serial; /* of its content */
   clt_live_picture picture;
-  uint8_t *content;
-  float *fields;                    /* gain, then offset */
-  size_t content_room, fields_room; /* bytes */
+  player_codes *content; /* held */
+  float *fields;         /* gain, then offset */
+  size_t fields_room;    /* bytes */
 } output_moving;
 
 /* A picture of panel codes to show at once and until the next pattern; without codes: measuring has ended, the drive
@@ -148,6 +149,12 @@ typedef struct measure_progress {
   double seconds, left;
 } measure_progress;
 
+/* Frames of the camera since the daemon started, whatever rigs they were taken by. */
+typedef struct camera_frames {
+  long used;
+  long repeated, strange, torn; /* refused and taken again, as clt_rig_info tells them apart */
+} camera_frames;
+
 /* What came of refining; errors are ||y - target|| / ||target|| of photographs, noise is theirs. */
 typedef struct refinement {
   int photographs; /* 0: not refined */
@@ -180,6 +187,7 @@ typedef struct measure_result {
   char camera[32];  /* CALIBRATE: its driver */
   clt_rig_info rig; /* CALIBRATE; its texts are the two below */
   char response[32], source[CLT_TEXT_MAX];
+  camera_frames frames;
   clt_transport *transport; /* ACQUIRE, PHOTOMETRY, CHANGED, GEOMETRY; NULL: the one in use fits */
   renewal renewed;          /* PHOTOMETRY, CHANGED, GEOMETRY */
   clt_image observation;    /* VERIFY, REFINE: radiance */
@@ -262,11 +270,14 @@ typedef struct moving_job {
 typedef struct moving_report {
   uint64_t serial;                /* of the content */
   uint64_t frames, late, skipped; /* of the film: shown; ready more than a refresh after they were due; passed over */
+  uint64_t slow;                  /* took longer than a refresh */
+  uint64_t slipped;               /* since the film began: decoded after they were due */
   uint64_t direct;                /* compensated, with no time for a step (clt_frames_result) */
   double fps;                     /* over the last report's time */
   bool compensated;
-  double ms;              /* that the last frame took */
-  clt_frames_result last; /* of that, where it is compensated */
+  char why[CLT_MESSAGE_MAX]; /* the film stands still; empty where it does not */
+  double ms;                 /* that the last frame took */
+  clt_frames_result last;    /* of that, where it is compensated */
 } moving_report;
 
 /* Deep copy; `to` is overwritten. CLT_FAILED where memory is short (then `to` is empty). */

@@ -23,6 +23,7 @@ typedef struct measurer {
   clt_projector_info panel; /* that the rig was made for */
   measure_job *waiting;     /* came while another was worked on */
   uint64_t number;          /* of the job in work */
+  camera_frames closed;     /* by rigs that are closed */
   int64_t reported_ns;
 } measurer;
 
@@ -52,7 +53,21 @@ static bool on_progress(void *context, const clt_progress *progress) {
   return !cancelled(self);
 }
 
+static camera_frames count_frames(const measurer *self) {
+  camera_frames sum = self->closed;
+  if (self->station != NULL && self->station->rig != NULL) {
+    clt_rig_info info;
+    self->station->rig->operations->describe(self->station->rig, &info);
+    sum.used += info.frames;
+    sum.repeated += info.repeated;
+    sum.strange += info.strange;
+    sum.torn += info.torn;
+  }
+  return sum;
+}
+
 static void close_camera(measurer *self) {
+  self->closed = count_frames(self);
   if (self->station != NULL) {
     clt_station_close_camera(self->station);
   }
@@ -135,6 +150,7 @@ static clt_status renew(measurer *self, const measure_job *job, measure_result *
 /* With the new map T may fit again; what else changed is looked for as for MEASURE_CHANGED. */
 static clt_status renew_geometry(measurer *self, const measure_job *job, measure_result *result) {
   geometry_renewal found;
+  const camera_frames before = count_frames(self);
   self->reported_ns = 0;
   clt_status status = geometry_renew(job, self->station, self->standin, on_progress, self, &found, &result->error);
   if (status == CLT_OK && job->model == NULL) {
@@ -142,6 +158,7 @@ static clt_status renew_geometry(measurer *self, const measure_job *job, measure
   } else if (status == CLT_OK && found.adopted) {
     status = renew(self, job, result);
   }
+  self->closed = found.adopted ? before : self->closed; /* with the map came a new rig */
   result->renewed.geometry = found;
   return status;
 }
@@ -280,6 +297,7 @@ static void answer(measurer *self, measure_job *job) {
   result->kind = job->kind;
   result->number = self->number = job->number;
   result->error.status = work(self, job, result);
+  result->frames = count_frames(self);
   if (observes(job->kind)) {
     standin_release(self->boxes);
   }

@@ -1,6 +1,7 @@
 #include "daemon/moving.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -43,12 +44,26 @@ static void stop_playing(mover *self) {
   self->job = NULL;
 }
 
+/* Says once that the film stands still, and that it goes on. */
+static void follow_film(mover *self) {
+  clt_error problem = {0};
+  bool stands = player_failed(self->playing, &problem), stood = self->found.why[0] != '\0';
+  if (stands && !stood) {
+    clt_log(CLT_LOG_ERROR, "what moves stands still: %s", problem.message);
+  } else if (stood && !stands) {
+    clt_log(CLT_LOG_NOTICE, "what moves goes on");
+  }
+  snprintf(self->found.why, sizeof self->found.why, "%s", stands ? problem.message : "");
+}
+
 static void report(mover *self) {
   double passed = clt_clock_since(self->reported_ns);
   moving_report *letter = passed >= report_s ? clt_alloc(1, sizeof *letter) : NULL;
   if (letter == NULL) {
     return;
   }
+  self->found.slipped = player_slipped(self->playing);
+  follow_film(self);
   self->found.fps = (double)(self->found.frames - self->reported.frames) / passed;
   self->reported = self->found;
   self->reported_ns = clt_clock_ns();
@@ -63,6 +78,11 @@ static void take_job(mover *self, moving_job *job) {
                  self->job->projector.width == job->projector.width &&
                  self->job->projector.height == job->projector.height;
   player *kept = goes_on ? self->playing : NULL;
+  const moving_report before = self->found;
+  if (!goes_on) {
+    player_codes_drop(self->frame.codes);
+    self->frame = (player_frame){0};
+  }
   self->playing = goes_on ? NULL : self->playing;
   stop_playing(self);
   *self = (mover){.boxes = self->boxes,
@@ -73,6 +93,7 @@ static void take_job(mover *self, moving_job *job) {
                   .seed = self->seed,
                   .reported_ns = clt_clock_ns()};
   self->found.serial = job->serial;
+  snprintf(self->found.why, sizeof self->found.why, "%s", goes_on ? before.why : "");
   clt_film_options options = {job->projector.width, job->projector.height, job->picture_s};
   clt_status status = CLT_OK;
   if (job->path[0] != '\0' && kept == NULL) {
@@ -87,22 +108,20 @@ static void take_job(mover *self, moving_job *job) {
   }
 }
 
-static bool reserve(void **data, size_t *room, size_t bytes) {
-  if (*room < bytes) {
-    free(*data);
-    *data = clt_alloc(bytes, 1);
-    *room = *data != NULL ? bytes : 0;
+static bool reserve(output_moving *letter, size_t bytes) {
+  if (letter->fields_room < bytes) {
+    free(letter->fields);
+    letter->fields = clt_alloc(bytes, 1);
+    letter->fields_room = letter->fields != NULL ? bytes : 0;
   }
-  return *data != NULL;
+  return letter->fields != NULL;
 }
 
-/* A letter with room for the frame: one that came back, or a new one. */
+/* A letter with room for the frame's fields: one that came back, or a new one. */
 static output_moving *new_letter(const mover *self, size_t cells) {
   output_moving *letter = clt_mailbox_take(self->boxes->spares, 0);
   letter = letter != NULL ? letter : clt_alloc(1, sizeof *letter);
-  size_t bytes = (size_t)self->frame.shape.width * (size_t)self->frame.shape.height * COLOURS;
-  if (letter == NULL || !reserve((void **)&letter->content, &letter->content_room, bytes) ||
-      !reserve((void **)&letter->fields, &letter->fields_room, 2 * COLOURS * cells * sizeof(float))) {
+  if (letter == NULL || !reserve(letter, 2 * COLOURS * cells * sizeof(float))) {
     output_moving_free(letter);
     return NULL;
   }
@@ -112,11 +131,11 @@ static output_moving *new_letter(const mover *self, size_t cells) {
 static void fill_letter(mover *self, output_moving *letter, int grid_width, int grid_height) {
   size_t cells = (size_t)grid_width * (size_t)grid_height;
   const clt_film_frame *shape = &self->frame.shape;
-  memcpy(letter->content, self->frame.codes, (size_t)shape->width * (size_t)shape->height * COLOURS);
+  letter->content = player_codes_hold(self->frame.codes);
   letter->serial = self->job->serial;
   letter->picture = (clt_live_picture){.width = shape->width,
                                        .height = shape->height,
-                                       .content = letter->content,
+                                       .content = letter->content->data,
                                        .grid_width = grid_width,
                                        .grid_height = grid_height,
                                        .gain = letter->fields,
@@ -130,7 +149,7 @@ static clt_status compute(mover *self, output_moving *letter, size_t cells, doub
   float *gain = letter->fields, *offset = letter->fields + COLOURS * cells;
   if (self->frames != NULL) {
     const clt_film_frame *shape = &self->frame.shape;
-    return clt_frames_next(self->frames, self->frame.codes, shape->width, shape->height, seconds, gain, offset,
+    return clt_frames_next(self->frames, self->frame.codes->data, shape->width, shape->height, seconds, gain, offset,
                            &self->found.last, error);
   }
   for (size_t i = 0; i < COLOURS * cells; i++) {
@@ -157,6 +176,7 @@ static void count(mover *self, int64_t start_ns, bool fresh, int skipped) {
             self->job->frames.live.budget_ms);
   }
   found->ms = 1e-6 * (double)(now_ns - start_ns);
+  found->slow += fresh && found->ms > 1e3 * refresh_s(self);
   found->compensated = self->frames != NULL;
 }
 
@@ -224,5 +244,6 @@ void *moving_run(void *boxes) {
     }
   }
   stop_playing(&self);
+  player_codes_drop(self.frame.codes);
   return NULL;
 }

@@ -134,6 +134,8 @@ static void take_drive(output *main) {
 static void take_moving(output *main) {
   output_moving *newer = clt_mailbox_take(main->boxes->moving, 0);
   if (newer != NULL && main->moving != NULL) {
+    player_codes_drop(main->moving->content);
+    main->moving->content = NULL;
     clt_mailbox_put(main->boxes->spares, main->moving);
   }
   main->moving = newer != NULL ? newer : main->moving;

@@ -114,9 +114,11 @@ json_t *control_moving_note(const control *self) {
   if (moved->serial != self->found.content_serial || self->work.playing.path[0] == '\0') {
     return json_null();
   }
-  json_t *note = json_pack("{s:I, s:I, s:I, s:f, s:b, s:f}", "frames", (json_int_t)moved->frames, "late",
-                           (json_int_t)moved->late, "skipped", (json_int_t)moved->skipped, "fps", moved->fps,
+  json_t *note = json_pack("{s:I, s:I, s:I, s:I, s:I, s:f, s:b, s:f}", "frames", (json_int_t)moved->frames, "late",
+                           (json_int_t)moved->late, "slow", (json_int_t)moved->slow, "skipped",
+                           (json_int_t)moved->skipped, "slipped", (json_int_t)moved->slipped, "fps", moved->fps,
                            "compensated", moved->compensated, "ms", moved->ms);
+  json_object_set_new(note, "why", text_or_null(moved->why));
   if (moved->compensated) {
     json_object_set_new(note, "direct", json_integer((json_int_t)moved->direct));
     json_object_set_new(note, "error", last->direct ? json_null() : json_real(last->live.error));
@@ -166,9 +168,15 @@ static json_t *devices_note(const control_findings *found) {
     return json_null();
   }
   const clt_projector_info *panel = &found->devices.projector;
-  return json_pack("{s:s, s:o, s:o, s:[i, i], s:f}", "projector", found->devices.projector_name, "camera",
-                   text_or_null(found->camera), "source", text_or_null(found->source), "panel", panel->width,
-                   panel->height, "refresh_hz", panel->refresh_s > 0 ? 1 / panel->refresh_s : 0.0);
+  json_t *note = json_pack("{s:s, s:o, s:o, s:[i, i], s:f}", "projector", found->devices.projector_name, "camera",
+                           text_or_null(found->camera), "source", text_or_null(found->source), "panel", panel->width,
+                           panel->height, "refresh_hz", panel->refresh_s > 0 ? 1 / panel->refresh_s : 0.0);
+  const camera_frames *frames = &found->camera_frames;
+  json_object_set_new(note, "frames",
+                      json_pack("{s:I, s:I, s:I, s:I}", "used", (json_int_t)frames->used, "repeated",
+                                (json_int_t)frames->repeated, "strange", (json_int_t)frames->strange, "torn",
+                                (json_int_t)frames->torn));
+  return note;
 }
 
 json_t *control_status(const control *self) {

@@ -64,7 +64,7 @@ static void mean_columns(const float *sums, const span *columns, float scale, si
   }
 }
 
-static void fill_light(float light[CODES]) {
+void clt_srgb_light(float light[CODES]) {
   const clt_curve srgb = {.kind = CLT_CURVE_SRGB};
   for (int code = 0; code < CODES; code++) {
     light[code] = (float)clt_curve_decode(&srgb, code / (double)(CODES - 1));
@@ -79,7 +79,7 @@ clt_status clt_cell_means(const uint8_t *content, int content_width, int content
   span *columns = clt_alloc((size_t)width, sizeof *columns);
   float scale = (float)((double)width / content_width * height / content_height);
   bool ready = sums != NULL && columns != NULL;
-  fill_light(light);
+  clt_srgb_light(light);
   for (int x = 0; ready && x < width; x++) {
     columns[x] = span_of(x, content_width, width);
   }

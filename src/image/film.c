@@ -31,9 +31,11 @@ struct clt_film {
   int count, at; /* of names; the next one */
   clt_video *video;
   double frame_s;
-  int rectangle[4]; /* of a video's frame: what has the panel's aspect */
-  uint8_t *whole;   /* that rectangle, where it has more pixels than the panel */
-  float *light;     /* and what it becomes */
+  clt_film_source source; /* NULLs: none */
+  int source_size[2];     /* of its last picture */
+  int rectangle[4];       /* of a frame: what has the panel's aspect */
+  uint8_t *whole;         /* that rectangle, where it has more pixels than the panel */
+  float *light;           /* and what it becomes */
 };
 
 static bool is_folder(const char *path) {
@@ -140,6 +142,21 @@ static bool is_larger(const clt_film *film) {
   return film->rectangle[2] > film->options.width || film->rectangle[3] > film->options.height;
 }
 
+/* Prepares for frames of that size. */
+static clt_status fit(clt_film *film, int width, int height, clt_error *error) {
+  crop(film, width, height);
+  free(film->whole);
+  free(film->light);
+  film->whole = NULL;
+  film->light = NULL;
+  if (is_larger(film)) {
+    film->whole = clt_alloc((size_t)film->rectangle[2] * (size_t)film->rectangle[3] * COLOURS, 1);
+    film->light = clt_alloc((size_t)film->options.width * (size_t)film->options.height * COLOURS, sizeof(float));
+  }
+  bool ready = !is_larger(film) || (film->whole != NULL && film->light != NULL);
+  return ready ? CLT_OK : clt_fail(error, CLT_FAILED, "%s: memory is short for its frames", film->path);
+}
+
 static clt_status open_video(clt_film *film, clt_error *error) {
   clt_video_info info;
   clt_status status = clt_video_open(film->path, &film->video, &info, error);
@@ -148,13 +165,20 @@ static clt_status open_video(clt_film *film, clt_error *error) {
   }
   film->tries = 2; /* the end, then the first frame */
   film->frame_s = 1 / info.rate_hz;
-  crop(film, info.width, info.height);
-  if (is_larger(film)) {
-    film->whole = clt_alloc((size_t)film->rectangle[2] * (size_t)film->rectangle[3] * COLOURS, 1);
-    film->light = clt_alloc((size_t)film->options.width * (size_t)film->options.height * COLOURS, sizeof(float));
+  return fit(film, info.width, info.height, error);
+}
+
+/* The rectangle of a frame, which lies in `whole` where it is larger than the panel and is made smaller into codes. */
+static clt_status shrink(const clt_film *film, uint8_t *codes, clt_film_frame *frame, clt_error *error) {
+  int width = film->options.width, height = film->options.height;
+  *frame = (clt_film_frame){film->rectangle[2], film->rectangle[3], film->frame_s};
+  if (!is_larger(film)) {
+    return CLT_OK;
   }
-  bool ready = !is_larger(film) || (film->whole != NULL && film->light != NULL);
-  return ready ? CLT_OK : clt_fail(error, CLT_FAILED, "%s: memory is short for its frames", film->path);
+  clt_status status = clt_cell_means(film->whole, frame->width, frame->height, width, height, film->light, error);
+  clt_srgb_codes(film->light, (size_t)width * (size_t)height, codes);
+  *frame = (clt_film_frame){width, height, film->frame_s};
+  return status;
 }
 
 static clt_status next_of_video(clt_film *film, uint8_t *codes, clt_film_frame *frame, bool *shown, clt_error *error) {
@@ -164,19 +188,47 @@ static clt_status next_of_video(clt_film *film, uint8_t *codes, clt_film_frame *
   if (!*shown) {
     return clt_video_rewind(film->video, error);
   }
-  *frame = (clt_film_frame){film->rectangle[2], film->rectangle[3], film->frame_s};
-  if (larger) {
-    int width = film->options.width, height = film->options.height;
-    status = clt_cell_means(film->whole, frame->width, frame->height, width, height, film->light, error);
-    clt_srgb_codes(film->light, (size_t)width * (size_t)height, codes);
-    *frame = (clt_film_frame){width, height, film->frame_s};
+  return shrink(film, codes, frame, error);
+}
+
+static clt_status next_of_source(clt_film *film, uint8_t *codes, clt_film_frame *frame, bool *shown, clt_error *error) {
+  const uint8_t *from = NULL;
+  int width = 0, height = 0;
+  clt_status status = film->source.next(film->source.self, &from, &width, &height, error);
+  if (status == CLT_OK && (width != film->source_size[0] || height != film->source_size[1])) {
+    status = fit(film, width, height, error);
+    film->source_size[0] = status == CLT_OK ? width : 0;
+    film->source_size[1] = height;
   }
-  return status;
+  if (status != CLT_OK) {
+    return status;
+  }
+  const int *kept = film->rectangle;
+  uint8_t *to = is_larger(film) ? film->whole : codes;
+  size_t row = (size_t)kept[2] * COLOURS;
+  for (int y = 0; y < kept[3]; y++) {
+    memcpy(to + (size_t)y * row, from + ((size_t)(kept[1] + y) * (size_t)width + (size_t)kept[0]) * COLOURS, row);
+  }
+  *shown = true;
+  return shrink(film, codes, frame, error);
 }
 
 static const film_kind kinds[] = {{is_folder, open_folder, next_of_folder},
                                   {is_picture, open_picture, next_picture},
                                   {is_other, open_video, next_of_video}};
+
+clt_status clt_film_of_source(const clt_film_source *source, const clt_film_options *options, clt_film **out,
+                              clt_error *error) {
+  static const film_kind kind = {.next = next_of_source};
+  clt_film *film = clt_alloc(1, sizeof *film);
+  if (film == NULL) {
+    source->close(source->self);
+    return clt_fail(error, CLT_FAILED, "a video input: out of memory");
+  }
+  *film = (clt_film){.kind = &kind, .path = "video input", .options = *options, .tries = 1, .source = *source};
+  *out = film;
+  return CLT_OK;
+}
 
 clt_status clt_film_open(const char *path, const clt_film_options *options, clt_film **out, clt_error *error) {
   clt_film *film = clt_alloc(1, sizeof *film);
@@ -206,6 +258,9 @@ void clt_film_close(clt_film *film) {
   }
   free(film->names);
   clt_video_close(film->video);
+  if (film->source.close != NULL) {
+    film->source.close(film->source.self);
+  }
   free(film->whole);
   free(film->light);
   free(film);

@@ -18,6 +18,9 @@ static void describe_rig(const clt_rig *base, clt_rig_info *info) {
                          .patterns = rig->shots.shown,
                          .frames = rig->shots.frames,
                          .doubted = rig->doubted,
+                         .repeated = rig->shots.stuck,
+                         .strange = rig->strange,
+                         .torn = rig->torn,
                          .seconds = (double)rig->shots.last_ns * 1e-9};
 }
 

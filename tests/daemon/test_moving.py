@@ -132,6 +132,23 @@ def memory_is_constant_and_it_ends_at_once():
         assert code == 0 and seconds < 2, (code, seconds)
 
 
+def an_input_that_is_missing_is_waited_for():
+    with exhibit() as run:
+        run.write_config(content="/dev/counterlight-no-such-input", daemon=RETRY)
+        code, said = run.run("--check")
+        if code == 2 and "no Video4Linux" in said:
+            return "skip: no V4L2 in this build"
+        assert code == 0, said
+        run.start()
+        status = run.wait_state("showing")
+        assert status["frame"]["compensated"], status
+        moved = moving(run, lambda m: m["why"])
+        assert "counterlight-no-such-input" in moved["why"] and moved["frames"] == 0, moved
+        assert run.said().count("what moves stands still") == 1
+        assert run.stop()[0] == 0
+    return None
+
+
 def what_is_no_film_is_refused():
     with exhibit() as run:
         nothing = run.folder / "nothing.mkv"
@@ -150,4 +167,4 @@ if __name__ == "__main__":
     main([a_film_plays_and_is_compensated_once_the_room_is_known, a_film_plays_uncompensated_without_a_camera, scaled_content_says_how_far,
           a_folder_is_shown_picture_by_picture, what_show_brings_stops_the_film_and_reload_starts_it,
           subscribers_are_told_and_a_new_transport_is_taken_over, memory_is_constant_and_it_ends_at_once,
-          what_is_no_film_is_refused])
+          an_input_that_is_missing_is_waited_for, what_is_no_film_is_refused])

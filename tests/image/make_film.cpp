@@ -1,4 +1,6 @@
-// make_film FILE WIDTH HEIGHT FRAMES RATE: a film with what is hard to follow: things that move, a fade, and cuts.
+// make_film FILE WIDTH HEIGHT FRAMES RATE [numbered]: a film with what is hard to follow: things that move, a fade, and
+// cuts. Numbered, a strip at the left, a sixteenth of the width, says three times from top to bottom which frame it is:
+// a white block, a black one, then the ten bits of its number, the highest first.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -20,18 +22,34 @@ cv::Mat draw(int width, int height, int frame) {
   return picture;
 }
 
+constexpr int copies = 3, bits = 10, blocks = copies * (bits + 2);
+
+void write_number(int frame, cv::Mat &picture) {
+  for (int block = 0; block < blocks; block++) {
+    int place = block % (bits + 2);
+    bool white = place == 0 || (place > 1 && (frame >> (bits + 1 - place) & 1) != 0);
+    int top = picture.rows * block / blocks, bottom = picture.rows * (block + 1) / blocks;
+    picture(cv::Rect(0, top, picture.cols / 16, bottom - top))
+        .setTo(white ? cv::Scalar::all(230) : cv::Scalar::all(20));
+  }
+}
+
 } // namespace
 
 int main(int count, char **arguments) {
-  if (count != 6) {
-    std::fputs("make_film FILE WIDTH HEIGHT FRAMES RATE\n", stderr);
+  if (count < 6) {
+    std::fputs("make_film FILE WIDTH HEIGHT FRAMES RATE [numbered]\n", stderr);
     return 2;
   }
   int width = std::atoi(arguments[2]), height = std::atoi(arguments[3]), frames = std::atoi(arguments[4]);
   cv::VideoWriter writer(arguments[1], cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), std::atof(arguments[5]),
                          cv::Size(width, height));
   for (int frame = 0; frame < frames && writer.isOpened(); frame++) {
-    writer.write(draw(width, height, frame));
+    cv::Mat picture = draw(width, height, frame);
+    if (count > 6) {
+      write_number(frame, picture);
+    }
+    writer.write(picture);
   }
   return writer.isOpened() ? 0 : 1;
 }

@@ -149,6 +149,64 @@ static void a_video_loops(void **state) {
   unlink(in_folder("film.avi"));
 }
 
+/* A device that first gives a picture of the panel's size, then nothing once, then one that is larger and too wide. */
+typedef struct device {
+  int calls, closed;
+  uint8_t small[6 * 4 * 3], large[18 * 8 * 3];
+} device;
+
+static clt_status next_of_device(void *self, const uint8_t **codes, int *width, int *height, clt_error *error) {
+  device *from = self;
+  bool large = from->calls++ > 1;
+  *codes = large ? from->large : from->small;
+  *width = large ? 18 : 6;
+  *height = large ? 8 : 4;
+  return from->calls == 2 ? clt_fail(error, CLT_TIMEOUT, "nothing comes") : CLT_OK;
+}
+
+static void close_device(void *self) {
+  ((device *)self)->closed++;
+}
+
+/* Codes come as they were taken, whatever failed before; of a larger picture the middle that has the panel's aspect, in
+ * means over 2 x 2 equal pixels. */
+static void a_source_is_shown_as_it_comes(void **state) {
+  (void)state;
+  device from = {0};
+  uint64_t seed = 3;
+  for (size_t i = 0; i < sizeof from.small; i++) {
+    from.small[i] = (uint8_t)(256 * test_random(&seed));
+  }
+  for (int y = 0; y < 8; y++) {
+    for (int x = 0; x < 18 * 3; x++) {
+      int column = x / 3 - 3;
+      from.large[y * 18 * 3 + x] =
+          column >= 0 && column < 12 ? from.small[(y / 2 * 6 + column / 2) * 3 + x % 3] : (uint8_t)(37 * x);
+    }
+  }
+  clt_film_options options = {.width = 6, .height = 4, .picture_s = 1};
+  clt_film *film = NULL;
+  clt_film_frame frame;
+  clt_error error = {0};
+  uint8_t codes[6 * 4 * 3];
+  assert_ok(clt_film_of_source(&(clt_film_source){&from, next_of_device, close_device}, &options, &film, &error),
+            error);
+  assert_int_equal(clt_film_bytes(film), sizeof codes);
+  for (int k = 0; k < 3; k++) {
+    memset(codes, 0, sizeof codes);
+    clt_status status = clt_film_next(film, codes, &frame, &error);
+    assert_int_equal(status, k == 1 ? CLT_TIMEOUT : CLT_OK);
+    if (status == CLT_OK) {
+      assert_int_equal(frame.width, 6);
+      assert_int_equal(frame.height, 4);
+      assert_near(frame.seconds, 0, 0);
+      assert_memory_equal(codes, from.small, sizeof codes);
+    }
+  }
+  clt_film_close(film);
+  assert_int_equal(from.closed, 1);
+}
+
 static void what_is_no_film_is_refused(void **state) {
   (void)state;
   clt_film_options options = {.width = 8, .height = 6, .picture_s = 1};
@@ -170,6 +228,7 @@ int main(int count, char **arguments) {
       cmocka_unit_test(a_picture_is_shown_for_ever),
       cmocka_unit_test(a_folder_is_shown_in_turn),
       cmocka_unit_test(a_video_loops),
+      cmocka_unit_test(a_source_is_shown_as_it_comes),
       cmocka_unit_test(what_is_no_film_is_refused),
   };
   if (count != 2) {

@@ -13,6 +13,7 @@
 #include <X11/Xatom.h>
 
 #include "base/clock.h"
+#include "base/log.h"
 
 /* A GLFW for Wayland only, which has the same soname, lacks these. */
 #pragma weak glfwGetX11Display
@@ -30,6 +31,18 @@ static int ignore(Display *display, XErrorEvent *event) {
   (void)display;
   (void)event;
   return 0;
+}
+
+static int tell(Display *display, XErrorEvent *event) {
+  char why[80];
+  XGetErrorText(display, event->error_code, why, sizeof why);
+  clt_log(CLT_LOG_WARNING, "the X server refused request %d.%d: %s; did a monitor change just then?",
+          event->request_code, event->minor_code, why);
+  return 0;
+}
+
+void clt_desktop_bear_refusals(bool bear) {
+  XSetErrorHandler(bear ? tell : NULL);
 }
 
 /* A monitor may go while it is asked: Xlib's own handler would end the process. */

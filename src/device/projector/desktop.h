@@ -11,6 +11,9 @@ struct GLFWmonitor;
 
 /* True where GLFW talks to an X server. */
 bool clt_desktop_is_x11(void);
+/* What the X server refuses is logged from now on, or again ends the process as Xlib has it: a monitor that goes while
+ * GLFW sets its mode is no reason to end. */
+void clt_desktop_bear_refusals(bool bear);
 /* The model that a monitor tells in its EDID ("Beam 9000"); empty where it tells none. */
 void clt_desktop_model(struct GLFWmonitor *monitor, char *model, size_t size);
 /* Holds off the screen saver and the switching off of monitors (DPMS), or no longer. The X server forgets it by itself

@@ -134,12 +134,14 @@ clt_status clt_screen_open(const clt_projector_config *config, clt_screen *scree
                      "is an X server or a Wayland compositor running, and DISPLAY or "
                      "WAYLAND_DISPLAY set?");
   }
+  clt_desktop_bear_refusals(true);
   clt_status status = config->window ? open_on_desk(screen, error) : open_on_monitor(screen, error);
   if (status == CLT_OK && screen->window == NULL) {
     status = fail_glfw(error, "no window with OpenGL 3.3", "is a GL driver installed (counterlight doctor)?");
   }
   if (status != CLT_OK) {
     glfwTerminate();
+    clt_desktop_bear_refusals(false);
     return status;
   }
   glfwMakeContextCurrent(screen->window);
@@ -219,5 +221,6 @@ void clt_screen_close(clt_screen *screen) {
   clt_desktop_keep_awake(false);
   glfwDestroyWindow(screen->window);
   glfwTerminate();
+  clt_desktop_bear_refusals(false);
   screen->window = NULL;
 }
