@@ -1,4 +1,4 @@
-"""Runs a test of real device drivers in the guest of tests/vm, and skips where there is none.
+"""Runs a test of real device drivers in the guest of tests/vm, in virtual time, and skips where there is none.
 
     test_in_guest.py SCRIPT ARGUMENTS...
 
@@ -24,7 +24,7 @@ def main():
         return SKIP
     script = HERE / sys.argv[1]
     command = [sys.executable, "-B", str(script), *(os.path.abspath(a) for a in sys.argv[2:])]
-    done = subprocess.run([*runner, "-t", "240", shlex.join(command)], text=True, stdout=subprocess.PIPE, check=False)
+    done = subprocess.run([*runner, "-v", "-t", "240", shlex.join(command)], text=True, stdout=subprocess.PIPE, check=False)
     print(done.stdout)
     return done.returncode
 
