@@ -1,5 +1,4 @@
 """A station on tests/vm/scene.cfg: its configuration, its calibration, its daemon, and how near it comes to the target."""
-import os
 import pathlib
 import subprocess
 import sys
