@@ -36,14 +36,14 @@ daemon = {{
 """
 
 
-def wait_for(what, check, timeout=PATIENCE):
+def wait_for(what, check, timeout=PATIENCE, pause=0.01):
     """Polls until check() gives something true, and returns that."""
     end = time.monotonic() + timeout
     while time.monotonic() < end:
         got = check()
         if got:
             return got
-        time.sleep(0.01)
+        time.sleep(pause)
     raise AssertionError(f"{what} did not come within {timeout} s")
 
 

@@ -1,5 +1,5 @@
 """The service under systemd as init, in a guest of its own kernel: see guest_service.py, which runs in there.
-Arguments: build folder, "virtual" or "real" (what time is in the guest), names of tests."""
+Arguments: build folder, names of tests."""
 import os
 import pathlib
 import shlex
@@ -23,10 +23,8 @@ def main():
         subprocess.run(["meson", "install", "-C", sys.argv[1], "--no-rebuild", "--destdir", root], check=True,
                        capture_output=True)
         shutil.copytree(HERE, scripts)
-        settings = [f"{name}={os.environ[name]}" for name in ("CLT_KILLS", "CLT_TEST_PATIENCE") if name in os.environ]
-        job = shlex.join(["env", *settings, "/usr/bin/python3", f"{scripts}/guest_service.py", root, *sys.argv[3:]])
-        guest = [RUNNER, *(["-v"] if sys.argv[2] == "virtual" else []), *(["-k", kernel] if kernel else []), "-s", "-t",
-                 os.environ.get("CLT_VM_SECONDS", "280")]
+        job = shlex.join(["/usr/bin/python3", f"{scripts}/guest_service.py", root, *sys.argv[2:]])
+        guest = [RUNNER, "-v", *(["-k", kernel] if kernel else []), "-s", "-t", os.environ.get("CLT_VM_SECONDS", "1100")]
         return subprocess.run([*guest, f"{job} 2>&1"], cwd="/").returncode
 
 

@@ -3,7 +3,6 @@ unplugged camera is gone and comes back, and nothing is left behind.
 
     guest_libcamera.py PROBE CAMERA"""
 import fcntl
-import os
 import pathlib
 import signal
 import struct
@@ -12,30 +11,12 @@ import sys
 
 import numpy as np
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "vm"))
+from usb_host import give_firmware_node  # noqa: E402
+
 SKIP = 77
 WIDTH, HEIGHT = 720, 480
-HUB = pathlib.Path("/sys/devices/platform/vhci_hcd.0")
 USB_NAME, VIMC_NAME = "VHCI-1:1.0-1d6b:0104", "Sensor B"
-
-
-def give_firmware_node():
-    """libcamera names a USB camera by the firmware's node of its host, which a virtual host has not: a folder that shows
-    the host's own entries, and a node, is laid over it."""
-    real, shown = pathlib.Path("/run/hub.real"), pathlib.Path("/run/hub.shown")
-    real.mkdir()
-    shown.mkdir()
-    subprocess.run(["mount", "-n", "--bind", HUB, real], check=True)
-    subprocess.run(["mount", "-n", "-t", "tmpfs", "none", shown], check=True)
-    for entry in real.iterdir():
-        to = shown / entry.name
-        if entry.is_symlink():
-            to.symlink_to(os.readlink(entry))
-            continue
-        to.mkdir() if entry.is_dir() else to.touch()
-        subprocess.run(["mount", "-n", "--bind", entry, to], check=True)
-    (shown / "firmware_node").mkdir()
-    (shown / "firmware_node" / "path").write_text("\\_SB_.VHCI\n")
-    subprocess.run(["mount", "-n", "--rbind", shown, HUB], check=True)
 
 
 def has_locks():

@@ -1,6 +1,6 @@
-"""Runs a test of real device drivers in the guest of tests/vm, and skips where there is none.
+"""Runs a test of real device drivers in the guest of tests/vm, in virtual time, and skips where there is none.
 
-    test_in_guest.py [-v] SCRIPT ARGUMENTS...           -v: in virtual time
+    test_in_guest.py SCRIPT ARGUMENTS...
 
 The runner is $CLT_VM_RUN (a command line) or tests/vm/run of this tree."""
 import os
@@ -22,10 +22,9 @@ def main():
     if shutil.which("v4l2-ctl") is None:
         print("skipped: v4l2-ctl is not installed (package v4l-utils)")
         return SKIP
-    options = sys.argv[1:2] if sys.argv[1] == "-v" else []
-    script, *arguments = sys.argv[1 + len(options):]
-    command = [sys.executable, "-B", str(HERE / script), *(os.path.abspath(a) for a in arguments)]
-    done = subprocess.run([*runner, *options, "-t", "240", shlex.join(command)], text=True, stdout=subprocess.PIPE, check=False)
+    script = HERE / sys.argv[1]
+    command = [sys.executable, "-B", str(script), *(os.path.abspath(a) for a in sys.argv[2:])]
+    done = subprocess.run([*runner, "-v", "-t", "240", shlex.join(command)], text=True, stdout=subprocess.PIPE, check=False)
     print(done.stdout)
     return done.returncode
 

@@ -1,6 +1,9 @@
 /* Names of USB devices, and how often one may be reset. */
 #include "device/usb/usb.h"
 
+#include <time.h>
+
+#include "base/clock.h"
 #include "support.h"
 
 static void names_are_read(void **state) {
@@ -89,6 +92,22 @@ static void resets_become_rare(void **state) {
   assert_in_range(resets, 3600 / 64, 3600 / 64 + 7);
 }
 
+/* Whoever waits for a camera that is away leaves the processor to the picture. */
+static void waiting_takes_no_processor(void **state) {
+  (void)state;
+  const clt_usb_id nobody = {0xffff, 0xffff, "", ""};
+  clt_error error = {0};
+  int64_t start_ns = clt_clock_ns();
+  clock_t start = clock();
+  clt_status status = clt_usb_wait(&nobody, 1, &error);
+  double taken_s = (double)(clock() - start) / CLOCKS_PER_SEC, passed_s = clt_clock_since(start_ns);
+  if (status == CLT_FAILED) {
+    skip(); /* this machine lets nobody look at USB */
+  }
+  assert_int_equal(status, CLT_TIMEOUT);
+  assert_true(taken_s < 0.05 * passed_s);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(names_are_read),
@@ -96,6 +115,7 @@ int main(void) {
       cmocka_unit_test(what_is_not_said_matches_all),
       cmocka_unit_test(descriptions_are_names),
       cmocka_unit_test(resets_become_rare),
+      cmocka_unit_test(waiting_takes_no_processor),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

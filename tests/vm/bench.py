@@ -9,18 +9,19 @@ import numpy as np
 import station
 from exhibit import wait_for
 
-SCREEN, CAMERA = (640, 480), (320, 240)
+SCREEN, CAMERA = (320, 240), (320, 240)
 DEVICES = """
 projector = {{ driver = "glfw"; }};
-camera = {{ driver = "{driver}"; device = "{device}"; format = "YUYV"; width = {width}; height = {height};
-  rate_hz = 30; gain = 16; white_balance_k = 4600; response = "linear"; }};
+camera = {{ driver = "{driver}"; {own} format = "YUYV"; width = {width}; height = {height};
+  response = "linear"; }};
 """
-NAMES = {"v4l2": "usb:1d6b:0104:CL0001", "libcamera": "auto"}
+OWN = {"v4l2": 'device = "usb:1d6b:0104:CL0001"; rate_hz = 30; gain = 16; white_balance_k = 4600;',
+       "libcamera": "gain = 1.0;"}
 
 
 def devices(driver):
     """The sections of a configuration that name this bench's screen and camera."""
-    return DEVICES.format(driver=driver, device=NAMES[driver], width=CAMERA[0], height=CAMERA[1])
+    return DEVICES.format(driver=driver, own=OWN[driver], width=CAMERA[0], height=CAMERA[1])
 
 
 class Bench:
@@ -41,7 +42,8 @@ class Bench:
     def start_screen(self):
         read, write = os.pipe()
         self.screen = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", f"{SCREEN[0]}x{SCREEN[1]}x24",
-                                        "-nolisten", "tcp"], pass_fds=[write], stderr=subprocess.DEVNULL)
+                                        "-nolisten", "tcp", "-fbdir", self.folder], pass_fds=[write],
+                                       stderr=subprocess.DEVNULL)
         os.close(write)
         with os.fdopen(read) as told:
             return ":" + told.readline().strip()
@@ -64,6 +66,10 @@ class Bench:
             time.sleep(0.3)  # some refreshes of the screen
             before, now = now, self.save()
         return now
+
+    def screenshot(self):
+        """Every byte of the picture that is on the screen."""
+        return np.fromfile(self.folder / "Xvfb_screen0", np.uint8)
 
     def __enter__(self):
         return self

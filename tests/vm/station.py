@@ -1,5 +1,4 @@
 """A station on tests/vm/scene.cfg: its configuration, its calibration, its daemon, and how near it comes to the target."""
-import os
 import pathlib
 import subprocess
 import sys
@@ -50,8 +49,12 @@ class Station:
         self.configure('calibration = "calibration/calibration.h5";')
 
     def start(self):
-        self.process = subprocess.Popen([self.counterlightd, "--config", self.config, "--socket", self.socket,
-                                        "--state", self.folder / "state"])
+        with open(self.folder / "log", "wb") as log:
+            self.process = subprocess.Popen([self.counterlightd, "--config", self.config, "--socket", self.socket,
+                                            "--state", self.folder / "state"], stderr=log)
+
+    def said(self):
+        return (self.folder / "log").read_text(errors="replace")
 
     def status(self):
         assert self.process.poll() is None, "the daemon ended"
@@ -73,10 +76,12 @@ class Station:
     def __enter__(self):
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, kind, *_):
         if self.process is not None:
             self.process.terminate()
-            assert self.process.wait(20) == 0
+            code = self.process.wait(20)
+            print(self.said(), flush=True)
+            assert code == 0 or kind is not None, code
 
 
 def error_of(radiance):

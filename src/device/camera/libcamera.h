@@ -11,8 +11,9 @@
  * what is asked for, CLT_TIMEOUT where no picture came.
  *
  * A frame's exposed_ns is the request's SensorTimestamp (libcamera: when the first row of the active array is exposed),
- * else the time at which the buffer was full less the exposure. Frames carry the exposure that the request's metadata
- * tells; where it tells none (USB cameras), frames that may still have the exposure before are dropped. A camera
+ * less the exposure where the metadata tells none (USB cameras: stamped when the first bytes came); else the time at
+ * which the buffer was full less the exposure. Frames carry the exposure that the request's metadata tells; where it
+ * tells none, frames that may still have the exposure before are dropped. A camera
  * without a control of the exposure (vimc) has only one, for which its frame time stands. */
 clt_status clt_libcamera_camera_open(const clt_camera_config *config, clt_camera **out, clt_error *error);
 

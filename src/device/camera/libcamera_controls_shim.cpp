@@ -156,6 +156,8 @@ Stages make_stages(const Camera &camera, const clt_camera_config &config, const 
   return {automatic_off(camera), values};
 }
 
+/* Where no exposure is told, as on USB, the "sensor's" time is what the kernel stamped when the first bytes came, which
+ * are sent when the first rows were exposed. */
 void read_metadata(libcamera::Request &request, clt_libcamera_picture *picture) {
   const ControlList &told = request.metadata();
   auto exposure_us = told.get(controls::ExposureTime);
@@ -168,7 +170,7 @@ void read_metadata(libcamera::Request &request, clt_libcamera_picture *picture) 
   if (black) {
     picture->black_level = ((*black)[0] + (*black)[1] + (*black)[2] + (*black)[3]) / (4 * BLACK_SCALE);
   }
-  picture->stamp_starts = start_ns.has_value();
+  picture->stamp_starts = start_ns.has_value() && exposure_us.has_value();
   if (start_ns) {
     picture->stamp_ns = *start_ns;
   }

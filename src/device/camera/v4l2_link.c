@@ -97,7 +97,7 @@ static void pause_for(double seconds) {
 
 static void wait_for_news(const clt_v4l2_link *link, double seconds) {
   clt_error none;
-  if (!link->identity.is_usb || clt_usb_wait(&link->identity.usb, seconds, &none) == CLT_OK) {
+  if (!link->identity.is_usb || clt_usb_wait(&link->identity.usb, seconds, &none) != CLT_TIMEOUT) {
     pause_for(seconds < LOOK_S ? seconds : LOOK_S);
   }
 }

@@ -104,32 +104,32 @@ static int LIBUSB_CALL arrived(libusb_context *context, libusb_device *device, l
   return 0;
 }
 
-/* Looks after every arrival, and once in between where no arrivals are told. */
+/* Looks after every arrival, and once in between where no arrivals are told. Told by one registration for all the wait:
+ * the end of one wakes whoever waits next, who would never wait again. */
 static clt_status wait_in(libusb_context *context, const clt_usb_id *which, double timeout_s, clt_error *error) {
   int64_t start = clt_clock_ns();
-  for (;;) {
-    libusb_device *device = find(context, which);
-    if (device != NULL) {
-      libusb_unref_device(device);
-      return CLT_OK;
-    }
-    double left = timeout_s - clt_clock_since(start);
-    if (left <= 0) {
-      char text[192];
-      clt_usb_describe(which, text, sizeof text);
-      return clt_fail(error, CLT_TIMEOUT, "%s was not plugged in within %.3g s", text, timeout_s);
-    }
-    int news = 0;
-    libusb_hotplug_callback_handle handle = 0;
-    int code = libusb_hotplug_register_callback(context, LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED, LIBUSB_HOTPLUG_NO_FLAGS,
-                                                LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY,
-                                                LIBUSB_HOTPLUG_MATCH_ANY, arrived, &news, &handle);
-    struct timeval slice = {0, left < 0.25 ? (int)(left * 1e6) : 250000};
+  int news = 0;
+  libusb_device *device;
+  libusb_hotplug_callback_handle handle = 0;
+  int code = libusb_hotplug_register_callback(context, LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED, LIBUSB_HOTPLUG_NO_FLAGS,
+                                              LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY,
+                                              LIBUSB_HOTPLUG_MATCH_ANY, arrived, &news, &handle);
+  double left = timeout_s;
+  while ((device = find(context, which)) == NULL && (left = timeout_s - clt_clock_since(start)) > 0) {
+    struct timeval slice = {0, left < 0.25 ? (int)(left * 1e6) + 1 : 250000};
+    news = 0;
     libusb_handle_events_timeout_completed(context, &slice, &news);
-    if (code == 0) {
-      libusb_hotplug_deregister_callback(context, handle);
-    }
   }
+  if (code == 0) {
+    libusb_hotplug_deregister_callback(context, handle);
+  }
+  if (device == NULL) {
+    char text[192];
+    clt_usb_describe(which, text, sizeof text);
+    return clt_fail(error, CLT_TIMEOUT, "%s was not plugged in within %.3g s", text, timeout_s);
+  }
+  libusb_unref_device(device);
+  return CLT_OK;
 }
 
 clt_status clt_usb_wait(const clt_usb_id *which, double timeout_s, clt_error *error) {
