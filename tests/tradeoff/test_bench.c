@@ -51,8 +51,14 @@ static void test_report(void **unused) {
   assert_true(report.frame.residual <= options.target_error && report.frame.error >= report.frame.residual);
   assert_int_equal(report.peer_count, 3);
   assert_string_equal(report.peer[0].name, "report-jacobi-csr-f32");
-  assert_true(report.peer[0].error < 0.05);
+  assert_true(report.peer[0].error <= options.target_error && report.peer[0].entries >= 128);
   assert_true(report.peer[1].error <= options.target_error && report.peer[2].error <= 2 * options.target_error);
+  for (int k = 0; k < report.peer_count; k++) {
+    const clt_bench_peer *peer = &report.peer[k];
+    assert_true(peer->ms > 0 && peer->warm_ms > 0);
+    assert_near(peer->ratio, peer->ms / report.frame.cold_ms, 1e-9 * peer->ratio);
+    assert_near(peer->warm_ratio, peer->warm_ms / report.frame.p50_ms, 1e-9 * peer->warm_ratio);
+  }
   assert_int_equal(report.point_count, 0);
   clt_transport_destroy(room);
 }
