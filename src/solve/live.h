@@ -27,10 +27,8 @@ struct clt_live {
   void *own;         /* the form's */
   int64_t start_ns;  /* of the frame */
   double white_norm; /* ||white|| over lit cells of every channel */
+  double size;       /* ||target|| of the frame over the same, or that of a target that is black */
   double seen;       /* ||T drive|| over the same, relative to ||target||: the form's part of the estimate */
 };
-
-/* ||target|| over lit cells of every channel, or ||white|| of a target that is black. */
-double clt_live_size(const clt_live *live, const float *target);
 
 #endif
