@@ -87,6 +87,7 @@ struct clt_far {
   size_t cells, items, rank;
   clt_live_item *item;              /* channel by channel, leaf by leaf */
   size_t strips;                    /* of rows, in all items */
+  size_t blocks;                    /* of near light, in all items */
   float *constant;                  /* strips x CLT_LIVE_PLANES x lanes */
   float *wanted, *shown, *drive[3]; /* strips x lanes: b, and the light T x of the last look; channels x cells */
   float *vectors;                   /* that these lie in */

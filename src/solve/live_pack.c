@@ -105,8 +105,8 @@ static void pack_near(clt_far *far, const clt_live_item *item, const float *inve
   }
 }
 
-/* Finds how many strips and blocks of near light every item has; returns the blocks of all. */
-static size_t find_places(clt_far *far, const float *inverse, bool near) {
+/* Finds where every item's strips and blocks of near light begin, and how many blocks there are. */
+static void find_places(clt_far *far, const float *inverse, bool near) {
   size_t strips = 0, blocks = 0;
   for (size_t k = 0; k < far->items; k++) {
     clt_live_item *item = &far->item[k];
@@ -121,7 +121,7 @@ static size_t find_places(clt_far *far, const float *inverse, bool near) {
     }
     strips += (size_t)(strips_of(leaf) * leaf->height);
   }
-  return blocks;
+  far->blocks = blocks;
 }
 
 static size_t count_strips(const clt_far *far) {
@@ -164,8 +164,8 @@ clt_status clt_live_pack(clt_far *far, const float *inverse, clt_error *error) {
   if (near && far->around == NULL) {
     return fail(far, error);
   }
-  const size_t blocks = find_places(far, inverse, near);
-  far->spill = near ? clt_alloc(blocks + 1, LANES * sizeof *far->spill) : NULL;
+  find_places(far, inverse, near);
+  far->spill = near ? clt_alloc(far->blocks + 1, LANES * sizeof *far->spill) : NULL;
   if (near && far->spill == NULL) {
     return fail(far, error);
   }

@@ -136,7 +136,7 @@ clt_status clt_bench(const clt_transport *transport, const clt_bench_options *op
   }
   clt_status status = clt_certify(transport, &certificate, error);
   if (status == CLT_OK) {
-    status = clt_bench_kernels(transport, report, error);
+    status = clt_bench_kernels(transport, certificate, report, error);
   }
   if (status == CLT_OK) {
     status = clt_bench_frames(transport, certificate, &asked, &report->frame, error);

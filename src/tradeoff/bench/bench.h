@@ -13,7 +13,8 @@ void clt_bench_picture(const clt_transport *transport, int number, double *drive
 /* The median of count times, which are sorted. */
 double clt_bench_median(double *times, size_t count);
 
-clt_status clt_bench_kernels(const clt_transport *transport, clt_bench_report *report, clt_error *error);
+clt_status clt_bench_kernels(const clt_transport *transport, const clt_certificate *certificate,
+                             clt_bench_report *report, clt_error *error);
 clt_status clt_bench_frames(const clt_transport *transport, const clt_certificate *certificate,
                             const clt_bench_options *options, clt_bench_frame *frame, clt_error *error);
 /* The report's iteration (eq. 43) in single precision over compressed rows of as few entries (128, 256, ...) as make
