@@ -101,15 +101,17 @@ struct clt_far {
   int now, best;                /* of drive */
   float mean[CLT_CHANNELS_MAX]; /* of the drive */
   size_t lit[CLT_CHANNELS_MAX];
-  size_t coupled[CLT_CHANNELS_MAX];     /* the first so many of the rank, which the factor couples */
-  bool bound[CLT_CHANNELS_MAX];         /* some cells are held */
-  bool pulled[CLT_CHANNELS_MAX];        /* they are, or q is not 0 yet */
-  bool ready[CLT_CHANNELS_MAX];         /* the factor */
-  float *small;                         /* per channel: the five below */
-  float *z, *q, *right, *gram, *factor; /* R, R, 2R (dz), R x R (V' D^-2 V over lit cells), up to 2R x 2R */
-  int *pivots;
-  float *partial; /* channels x CLT_NEWTON_CHUNKS x 2R */
-  float *tall;    /* 4L x R: room for the products that make a factor */
+  size_t coupled[CLT_CHANNELS_MAX]; /* the first so many of the rank, which the factor couples */
+  bool bound[CLT_CHANNELS_MAX];     /* some cells are held */
+  bool pulled[CLT_CHANNELS_MAX];    /* they are, or q is not 0 yet */
+  bool ready[CLT_CHANNELS_MAX];     /* the factor where cells are held */
+  float *small;                     /* per channel: the four below */
+  float *z, *q, *right, *gram;      /* R, R, 2R (dz), R x R (V' D^-2 V over lit cells) */
+  float *factor;                    /* per channel: two, of twice as many columns as the most that are coupled */
+  size_t order;                     /* that many */
+  int *pivots;                      /* of both factors: where no cell is held, and where some are */
+  float *partial;                   /* channels x CLT_NEWTON_CHUNKS x 2R */
+  float *tall;                      /* 4L x R: room for the products that make a factor */
 };
 
 extern const clt_live_kernels *const clt_live_variants[];
@@ -121,7 +123,7 @@ clt_status clt_live_pack(clt_far *far, const float *inverse, clt_error *error);
 /* Room for the small systems of every channel, and how much of the rank the factor couples. */
 clt_status clt_newton_create(clt_far *far, clt_error *error);
 void clt_newton_destroy(clt_far *far);
-/* Takes the factor of a channel from the moments of its items; false where it is singular. */
+/* Takes the factor of a channel from what its items hold; false where it is singular. That of no held cell is known. */
 bool clt_newton_factor(clt_far *far, int channel);
 /* The rest is called by every thread of a team, which shares the work. */
 /* dz and q of every channel from what the items give and take. */

@@ -176,7 +176,8 @@ static bool is_near(clt_far *far, const frame *at, double enough, clt_live_resul
   return sqrt(at->gap) + sqrt(drifts) <= enough;
 }
 
-/* Takes the factor of a channel anew where other cells are held than it knows of: by leaves, for it knows no cells. */
+/* Takes the factor of a channel anew where other cells are held than it knows of: by leaves, for it knows no cells.
+ * That of no held cell is always there. */
 static bool keep_factor(clt_far *far, int channel, bool renew) {
   const size_t leaves = far->hierarchy->leaves, first = (size_t)channel * leaves;
   double changed = 0, held = 0;
@@ -191,7 +192,8 @@ static bool keep_factor(clt_far *far, int channel, bool renew) {
   }
   far->bound[channel] = held > 0;
   far->pulled[channel] = far->pulled[channel] || held > 0;
-  return (far->ready[channel] && (changed == 0 || (!renew && changed <= MOVED * (double)far->lit[channel]))) ||
+  return held == 0 ||
+         (far->ready[channel] && (changed == 0 || (!renew && changed <= MOVED * (double)far->lit[channel]))) ||
          clt_newton_factor(far, channel);
 }
 

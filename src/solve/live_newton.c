@@ -42,10 +42,9 @@ static float *of_channel(float *all, size_t each, int channel) {
 
 static clt_status reserve(clt_far *far, clt_error *error) {
   const size_t rank = far->rank, channels = (size_t)far->channels;
-  far->small = clt_alloc(channels * rank, (4 + 2 * CHUNKS + 5 * rank) * sizeof *far->small);
-  far->pivots = clt_alloc(2 * rank, channels * sizeof *far->pivots);
+  far->small = clt_alloc(channels * rank, (4 + 2 * CHUNKS + rank) * sizeof *far->small);
   far->tall = clt_alloc(TERMS * leaves_of(far) * rank, sizeof *far->tall);
-  if (far->small == NULL || far->pivots == NULL || far->tall == NULL) {
+  if (far->small == NULL || far->tall == NULL) {
     return clt_fail(error, CLT_FAILED, "no memory for steps over far light of rank %zu", rank);
   }
   far->z = far->small;
@@ -53,12 +52,12 @@ static clt_status reserve(clt_far *far, clt_error *error) {
   far->right = far->q + channels * rank;
   far->partial = far->right + channels * 2 * rank;
   far->gram = far->partial + channels * CHUNKS * 2 * rank;
-  far->factor = far->gram + channels * rank * rank;
   return CLT_OK;
 }
 
 void clt_newton_destroy(clt_far *far) {
   free(far->small);
+  free(far->factor);
   free(far->pivots);
   free(far->tall);
 }
@@ -135,11 +134,42 @@ static clt_status prepare_channel(clt_far *far, int channel, clt_error *error) {
   return CLT_OK;
 }
 
+/* The factor of a channel that serves now, and its pivots. */
+static float *factor_now(const clt_far *far, int channel) {
+  return far->factor + (2 * (size_t)channel + far->bound[channel]) * far->order * far->order;
+}
+
+static int *pivots_now(const clt_far *far, int channel) {
+  return far->pivots + (2 * (size_t)channel + far->bound[channel]) * far->order;
+}
+
+static clt_status factor_free(clt_far *far, clt_error *error) {
+  const size_t channels = (size_t)far->channels;
+  for (int c = 0; c < far->channels; c++) {
+    far->order = 2 * far->coupled[c] > far->order ? 2 * far->coupled[c] : far->order;
+  }
+  far->factor = clt_alloc(2 * channels * far->order, far->order * sizeof *far->factor);
+  far->pivots = clt_alloc(2 * channels, far->order * sizeof *far->pivots);
+  if (far->factor == NULL || far->pivots == NULL) {
+    return clt_fail(error, CLT_FAILED, "no memory for factors of far light of rank %zu", far->rank);
+  }
+  for (int c = 0; c < far->channels; c++) {
+    if (!clt_newton_factor(far, c)) {
+      return clt_fail(error, CLT_FAILED, "far light of rank %zu has a singular factor", far->rank);
+    }
+    far->ready[c] = false;
+  }
+  return CLT_OK;
+}
+
 clt_status clt_newton_create(clt_far *far, clt_error *error) {
   clt_status status = reserve(far, error);
   far->open = true;
   for (int c = 0; status == CLT_OK && c < far->channels; c++) {
     status = prepare_channel(far, c, error);
+  }
+  if (status == CLT_OK) {
+    status = factor_free(far, error);
   }
   far->open = false;
   return status;
@@ -149,7 +179,7 @@ clt_status clt_newton_create(clt_far *far, clt_error *error) {
 bool clt_newton_factor(clt_far *far, int channel) {
   const size_t count = far->coupled[channel], order = 2 * count;
   const float *left = left_of(far, channel), *right = right_of(far, channel);
-  float *matrix = of_channel(far->factor, 4 * far->rank * far->rank, channel);
+  float *matrix = factor_now(far, channel);
   weigh_items(far, channel);
   weigh_product(far, channel, 0, right, left, count, 1, matrix, order); /* G */
   for (size_t j = 0; j < count; j++) {
@@ -166,7 +196,7 @@ bool clt_newton_factor(clt_far *far, int channel) {
     memcpy(item->known, item->held, sizeof item->known);
   }
   far->ready[channel] = LAPACKE_sgetrf_work(LAPACK_COL_MAJOR, (lapack_int)order, (lapack_int)order, matrix,
-                                            (lapack_int)order, far->pivots + (size_t)channel * 2 * far->rank) == 0;
+                                            (lapack_int)order, pivots_now(far, channel)) == 0;
   return far->ready[channel];
 }
 
@@ -214,8 +244,8 @@ static void solve_channel(clt_far *far, int channel) {
   } else {
     memset(taken, 0, count * sizeof *taken);
   }
-  LAPACKE_sgetrs_work(LAPACK_COL_MAJOR, 'N', (lapack_int)order, 1, of_channel(far->factor, 4 * rank * rank, channel),
-                      (lapack_int)order, far->pivots + (size_t)channel * 2 * rank, answer, (lapack_int)order);
+  LAPACKE_sgetrs_work(LAPACK_COL_MAJOR, 'N', (lapack_int)order, 1, factor_now(far, channel), (lapack_int)order,
+                      pivots_now(far, channel), answer, (lapack_int)order);
   far->pulled[channel] = far->bound[channel];
   if (far->bound[channel]) {
     for (size_t r = 0; r < count; r++) {
