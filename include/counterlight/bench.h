@@ -32,8 +32,10 @@ typedef struct clt_bench_frame {
 
 typedef struct clt_bench_peer {
   char name[CLT_BENCH_NAME_MAX];
-  double ms;    /* of a solve */
-  double error; /* ||T x - b|| / ||b|| of its answer, by T as stored */
+  double ms, warm_ms;       /* of a solve from nothing, and from the answer for the frame before; medians */
+  double error;             /* ||T x - b|| / ||b|| of the first, by T as stored */
+  double ratio, warm_ratio; /* ms over the frame's cold_ms, warm_ms over its p50_ms */
+  int entries;              /* that each row of its matrix keeps; 0: it takes T as stored */
 } clt_bench_peer;
 
 typedef struct clt_bench_point {

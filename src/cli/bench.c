@@ -40,7 +40,9 @@ static json_t *peers_json(const clt_bench_report *report) {
   json_t *all = json_array();
   for (int k = 0; k < report->peer_count; k++) {
     const clt_bench_peer *peer = &report->peer[k];
-    json_array_append_new(all, json_pack("{s:s, s:f, s:f}", "name", peer->name, "ms", peer->ms, "error", peer->error));
+    json_array_append_new(all, json_pack("{s:s, s:f, s:f, s:f, s:f, s:f, s:i}", "name", peer->name, "ms", peer->ms,
+                                         "warm_ms", peer->warm_ms, "error", peer->error, "ratio", peer->ratio,
+                                         "warm_ratio", peer->warm_ratio, "entries", peer->entries));
   }
   return all;
 }
@@ -52,6 +54,15 @@ static json_t *scaling_json(const clt_bench_report *report) {
   }
   return json_pack("{s:o, s:o}", "exponent", report->point_count > 1 ? json_real(report->exponent) : json_null(),
                    "points", points);
+}
+
+static void print_peer(const clt_bench_peer *peer) {
+  printf("%-22s %8.1f ms from nothing (%.0f x), %.1f ms warm (%.0f x), %.2f %% off", peer->name, peer->ms, peer->ratio,
+         peer->warm_ms, peer->warm_ratio, 100 * peer->error);
+  if (peer->entries > 0) {
+    printf(", %d entries a row", peer->entries);
+  }
+  printf("\n");
 }
 
 static void print_report(const clt_bench_report *report) {
@@ -68,7 +79,7 @@ static void print_report(const clt_bench_report *report) {
          frame->stage_ms[CLT_LIVE_PREPARE], frame->stage_ms[CLT_LIVE_SOLVE], frame->stage_ms[CLT_LIVE_ESTIMATE],
          100 * frame->residual, 100 * frame->error);
   for (int k = 0; k < report->peer_count; k++) {
-    printf("%-22s %9.1f ms, %.2f %% off\n", report->peer[k].name, report->peer[k].ms, 100 * report->peer[k].error);
+    print_peer(&report->peer[k]);
   }
   for (int k = 0; k < report->point_count; k++) {
     printf("%9.0f cells %9.2f ms a frame\n", report->point[k].cells, report->point[k].ms);

@@ -27,10 +27,28 @@ struct clt_live {
   void *own;         /* the form's */
   int64_t start_ns;  /* of the frame */
   double white_norm; /* ||white|| over lit cells of every channel */
+  double size;       /* ||target|| of the frame over the same, or that of a target that is black */
   double seen;       /* ||T drive|| over the same, relative to ||target||: the form's part of the estimate */
 };
 
-/* ||target|| over lit cells of every channel, or ||white|| of a target that is black. */
-double clt_live_size(const clt_live *live, const float *target);
+/* The passes over a hierarchy that a frame is made of: the target taken, the drive moved, far light collected and
+ * spread, the light of the drive and what is left. */
+typedef enum clt_live_pass_name {
+  CLT_LIVE_PASS_AIM,
+  CLT_LIVE_PASS_MOVE,
+  CLT_LIVE_PASS_GATHER,
+  CLT_LIVE_PASS_LIGHT,
+  CLT_LIVE_PASS_LOOK,
+  CLT_LIVE_PASSES
+} clt_live_pass_name;
+
+typedef struct clt_live_pass {
+  const char *name;
+  double bytes, seconds; /* that it reads and writes, and took */
+} clt_live_pass;
+
+/* Runs each pass once on what the last frame left, for `target`, and forgets the last drive. False, with nothing done,
+ * where frames do not go by a hierarchy. */
+bool clt_live_time_passes(clt_live *live, const float *target, clt_live_pass pass[CLT_LIVE_PASSES]);
 
 #endif

@@ -7,14 +7,19 @@
  *   x = P01(x + D^-1 (r + D^-1 V q)),   r = b - T x,
  *
  * a fixed point in which cells are coupled by the 2R numbers z = V'x and q alone. Newton's method for these: with F the
- * cells that the projection leaves free, A those that it holds, dx_A known,
+ * cells that the projection leaves free, A those that it holds, and s the step to the right side, by which x changes
+ * where z and q do not, dx_A = s_A and dx_F = s_F + D^-1 (D^-1 V dq - U dz)_F, so that
  *
- *   dx_F = D^-1 (r - U dz + D^-1 V q)_F
- *   [I + G   -H    ] [dz]   [ V_F' D^-1 r + V_A' dx_A ]     G = V_F' D^-1 U_F,   H = V_F' D^-2 V_F,
- *   [N       I + G'] [q ] = [ U_A' (r - D dx_A)       ]     N = U_A' U_A.
+ *   [I + G   -H    ] [dz]   [ V's             ]     G = V_F' D^-1 U_F,   H = V_F' D^-2 V_F,
+ *   [N       I + G'] [dq] = [ U'(r - D s) - q ]     N = U_A' U_A.
  *
  * G, H and N need of the cells only the moments of 1, u, v, u v over every leaf. This is the semismooth Newton method
- * (Qi & Sun 1993) for the box, at the price of two passes over the cells a step. */
+ * (Qi & Sun 1993) for the box, at the price of two passes over the cells a step. Right sides are exact; the matrix
+ * leaves out what far light of small singular values couples (dz = 0, dq = the right side there), which costs a step
+ * that part of its gain. Where no cell is held, q = 0.
+ *
+ * Passes take strips of eight cells down a leaf. What they read of a cell lies in the order in which they read it, so
+ * that memory is one stream; only drives lie as pictures do, because cells see their neighbours'. */
 #ifndef CLT_SOLVE_LIVE_FAR_H
 #define CLT_SOLVE_LIVE_FAR_H
 
@@ -26,74 +31,109 @@
 
 enum {
   CLT_LIVE_AROUND = 8,
+  CLT_LIVE_LANES = 8,
   CLT_LIVE_MOMENTS = 9
 }; /* of a weight over a leaf: the sums with u^a v^b, a and b 0..2, at [3 b + a] */
+
+/* What passes read of a strip of a row: lanes of each, one after the other; 0 behind a leaf's edge and at dark cells.
+ */
+typedef enum clt_live_plane {
+  CLT_LIVE_OWN,
+  CLT_LIVE_INVERSE, /* 1 / D */
+  CLT_LIVE_SCALE,
+  CLT_LIVE_GATHER,
+  CLT_LIVE_FLOOD,
+  CLT_LIVE_PLANES
+} clt_live_plane;
 
 /* One channel of one leaf. */
 typedef struct clt_live_item {
   int channel;
   size_t leaf;
+  size_t first, block; /* its first strip of a row, and its first block of near light */
   float far[CLT_LEAF_TERMS], pull[CLT_LEAF_TERMS], turn[CLT_LEAF_TERMS]; /* A z, B q, A dz over the leaf */
-  float free[CLT_LEAF_TERMS], held[CLT_LEAF_TERMS];   /* the leaf's part of the right sides above, before B' and A' */
-  float whole[CLT_LEAF_TERMS], drift[CLT_LEAF_TERMS]; /* P' diag(k) r, and B (U'r - q) */
-  float given[CLT_LEAF_TERMS];                        /* P' diag(v) x */
-  float weight[3][CLT_LIVE_MOMENTS];                  /* of v k / D and (v / D)^2 where free, k^2 where held */
-  float turnover;                                     /* sum of (v / D)^2 over lit cells */
-  double residual, gap, seen, light;                  /* ||r||^2, ||D (P01(..) - x)||^2, ||b - r||^2, sum of x */
-  long changed, held_cells;                           /* cells that are held otherwise than in the factor; held ones */
+  float give[CLT_LEAF_TERMS], take[CLT_LEAF_TERMS];  /* the leaf's part of the right sides, before B' and A' */
+  float whole[CLT_LEAF_TERMS];                       /* P' diag(k) r */
+  float given[CLT_LEAF_TERMS];                       /* P' diag(v) x */
+  float held[CLT_LEAF_TERMS], known[CLT_LEAF_TERMS]; /* sums of 1, u, v, u v over held cells: now, and in the factor */
+  float weight[3][CLT_LIVE_MOMENTS];                 /* of v k / D and (v / D)^2 where free, k^2 where held */
+  double residual, gap, wanted, seen, light;         /* ||r||^2, ||D s||^2, ||b||^2, ||b - r||^2, the sum of x */
 } clt_live_item;
 
 typedef struct clt_far clt_far;
-/* How rows of cells are passed over: portable C, and instructions that this processor may have. */
+/* How strips of cells are passed over: portable C, and instructions that this processor may have. */
 typedef struct clt_live_kernels {
   const char *needs; /* NULL: nothing */
   bool (*runs_here)(void);
-  /* r = b - T x and what the Newton step needs of it, over one item. */
+  /* Takes the target over an item (what is wanted of it), with the light that the drive is known to give: r and what
+   * the Newton step needs of it. */
+  void (*aim)(const clt_far *far, clt_live_item *item);
+  /* The same, of what is wanted already, with the light of the drive as it is now. */
   void (*look)(const clt_far *far, clt_live_item *item);
   /* next = P01(x + D^-1 (r - k P turn + v P pull / D)). */
   void (*move)(const clt_far *far, clt_live_item *item, float *next);
   /* The moments of the three weights, by what is held. */
   void (*weigh)(const clt_far *far, clt_live_item *item);
+  /* out_k += sum over the terms of a leaf of term_t row_tk, k < count; rows are `stride` apart. */
+  void (*add_rows)(const float *row, size_t stride, size_t count, const float term[CLT_LEAF_TERMS], float *out);
+  /* term_t = sum over k < count of row_tk in_k. */
+  void (*dot_rows)(const float *row, size_t stride, size_t count, const float *in, float term[CLT_LEAF_TERMS]);
 } clt_live_kernels;
 
 struct clt_far {
   const clt_hierarchy_storage *hierarchy;
   const clt_live_kernels *kernels;
-  int width;
+  int width, channels;
   size_t cells, items, rank;
-  clt_live_item *item; /* channel by channel, leaf by leaf */
-  float *plane;        /* the planes below, channels x cells each */
-  float *wanted, *residual, *inverse, *drive[3];
-  /* near light by the directions of the eight cells around a cell, in reading order: [row of cells, channel by channel]
-   * [direction][column]; NULL where some near entries join cells that are no neighbours. Drives have room for a row and
-   * a cell before and behind them. */
+  clt_live_item *item;              /* channel by channel, leaf by leaf */
+  size_t strips;                    /* of rows, in all items */
+  size_t blocks;                    /* of near light, in all items */
+  float *constant;                  /* strips x CLT_LIVE_PLANES x lanes */
+  float *wanted, *shown, *drive[3]; /* strips x lanes: b, and the light T x of the last look; channels x cells */
+  float *vectors;                   /* that these lie in */
+  /* Near light by the directions of the eight cells around a cell, in reading order: which of them each strip of a row
+   * has, and their lanes one after the other; NULL where some near entries join cells that are no neighbours. Drives
+   * have room for a row, a cell and a strip before and behind them. */
+  unsigned char *around;
   float *spill;
-  unsigned char *held, *factored; /* 1 where the projection holds a cell: now, and in the factor */
-  bool open;                      /* no cell is taken to be held: a step from nothing goes for the unbounded drive */
-  int now, best;                  /* of drive */
-  float mean[CLT_CHANNELS_MAX];   /* of the drive */
+  const float *target, *black[CLT_CHANNELS_MAX]; /* of the frame */
+  bool open;                    /* no cell is taken to be held: a step from nothing goes for the unbounded drive */
+  int now, best;                /* of drive */
+  float mean[CLT_CHANNELS_MAX]; /* of the drive */
   size_t lit[CLT_CHANNELS_MAX];
-  bool ready[CLT_CHANNELS_MAX];  /* the factor */
-  float *z, *q, *right, *factor; /* per channel: z and q (R), right sides and answers (2R), the factor of 2R x 2R */
-  int *pivots;
-  float *tall; /* 4L x R: room for the products that make a factor */
+  size_t coupled[CLT_CHANNELS_MAX]; /* the first so many of the rank, which the factor couples */
+  bool bound[CLT_CHANNELS_MAX];     /* some cells are held */
+  bool pulled[CLT_CHANNELS_MAX];    /* they are, or q is not 0 yet */
+  bool ready[CLT_CHANNELS_MAX];     /* the factor where cells are held */
+  float *small;                     /* per channel: the four below */
+  float *z, *q, *right, *gram;      /* R, R, 2R (dz), R x R (V' D^-2 V over lit cells) */
+  float *factor;                    /* per channel: two, of twice as many columns as the most that are coupled */
+  size_t order;                     /* that many */
+  int *pivots;                      /* of both factors: where no cell is held, and where some are */
+  float *partial;                   /* channels x CLT_NEWTON_CHUNKS x 2R */
+  float *tall;                      /* 4L x R: room for the products that make a factor */
 };
 
 extern const clt_live_kernels *const clt_live_variants[];
 const clt_live_kernels *clt_live_choose(void);
 
-clt_status clt_live_spread_near(clt_far *far, size_t channels, clt_error *error);
+/* Lays out what passes read: `inverse` is 1 / D, channels x cells, 0 at dark ones. */
+clt_status clt_live_pack(clt_far *far, const float *inverse, clt_error *error);
 
-/* Room for the small systems of every channel. */
-clt_status clt_newton_reserve(clt_far *far, int channels, clt_error *error);
-void clt_newton_release(clt_far *far);
-/* Takes the factor of a channel from the moments of its items; false where it is singular. */
+/* Room for the small systems of every channel, and how much of the rank the factor couples. */
+clt_status clt_newton_create(clt_far *far, clt_error *error);
+void clt_newton_destroy(clt_far *far);
+/* Takes the factor of a channel from what its items hold; false where it is singular. That of no held cell is known. */
 bool clt_newton_factor(clt_far *far, int channel);
-/* Solves for dz and q of a channel, into its items' turn and pull. */
-void clt_newton_step(clt_far *far, int channel);
-/* By how much ||D (P01(..) - x)||^2 may change where q becomes U'r, from r as it was looked at. */
-double clt_newton_drift(clt_far *far, int channel);
-/* z from what the items give, into their far. */
-void clt_newton_gather(clt_far *far, int channel);
+/* The rest is called by every thread of a team, which shares the work. */
+/* dz and q of every channel from what the items give and take. */
+void clt_newton_step(clt_far *far);
+/* Into an item's turn and pull. One thread. */
+void clt_newton_turn(const clt_far *far, clt_live_item *item);
+/* z of every channel from what the items give; and from it an item's far (one thread). */
+void clt_newton_gather(clt_far *far);
+void clt_newton_light(const clt_far *far, clt_live_item *item);
+/* drift[channel] = by how much ||D s||^2 may change where q becomes U'r, from r as it was looked at. */
+void clt_newton_drift(clt_far *far, double drift[CLT_CHANNELS_MAX]);
 
 #endif

@@ -90,7 +90,7 @@ static clt_status solve_frame(clt_live *live, const float *target, float *drive,
   clt_status status = clt_solver_run(own->solver, own->wanted, own->start, own->drive, &solve, error);
   if (status == CLT_OK) {
     memcpy(own->start, own->drive, values_of(live) * sizeof *own->drive);
-    tell(live, &solve, wanted, clt_live_size(live, target), result);
+    tell(live, &solve, wanted, live->size, result);
   }
   for (size_t at = 0; at < values_of(live); at++) {
     drive[at] = (float)own->start[at];

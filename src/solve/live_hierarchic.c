@@ -15,70 +15,47 @@ static const double SLOW = 0.3;   /* of the gap before: what a step leaves with 
 
 /* A frame under way. */
 typedef struct frame {
-  double size, wanted;                /* ||target|| as errors are told by, and ||target - black||^2 over lit cells */
+  double wanted;                      /* ||target - black||^2 over lit cells */
   double objective, least, gap, seen; /* squares: of the residual, the least so far, the gap, and what is seen */
+  double held;                        /* cells */
   double last_s;                      /* that the last step took */
   int stale;                          /* steps since the least */
   bool renew;                         /* the factors have aged */
   bool cold;                          /* begun from a drive of 0 */
-  long held;
 } frame;
 
 static size_t values_of(const clt_live *live) {
   return (size_t)live->info.channels * live->info.cols;
 }
 
-static clt_status reserve(clt_live *live, clt_far *far, clt_error *error) {
-  enum { PLANES = 6 };
-  const size_t values = values_of(live);
-  const size_t margin = (size_t)far->width + 1, drive = values + 2 * margin;
-  far->plane = clt_alloc((PLANES - 3) * values + 3 * drive, sizeof *far->plane);
-  far->held = clt_alloc(values, 2);
-  far->item = clt_alloc(far->items, sizeof *far->item);
-  if (far->plane == NULL || far->held == NULL || far->item == NULL) {
-    return clt_fail(error, CLT_FAILED, "no memory for moving pictures of %zu cells", far->cells);
-  }
-  far->factored = far->held + values;
-  far->wanted = far->plane;
-  far->residual = far->plane + values;
-  far->inverse = far->plane + 2 * values;
-  for (size_t k = 0; k < 3; k++) {
-    far->drive[k] = far->plane + 3 * values + k * drive + margin;
-  }
-  return clt_newton_reserve(far, live->info.channels, error);
-}
-
-static void measure_turnover(const clt_far *far, clt_live_item *item) {
-  const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
-  for (int32_t k = 0; k < leaf.width * leaf.height; k++) {
-    const size_t at = (size_t)item->channel * far->cells + (size_t)(leaf.y + k / leaf.width) * (size_t)far->width +
-                      (size_t)(leaf.x + k % leaf.width);
-    const float ratio = far->hierarchy->gather[at] * far->inverse[at];
-    item->turnover += ratio * ratio;
-  }
-}
-
-/* 1 / D at lit cells; where the near light of a cell is less than half of what it shows of itself, half of that. */
-static clt_status invert_cells(const clt_live *live, clt_far *far, clt_error *error) {
-  double *diagonal = clt_alloc(far->cells, sizeof *diagonal);
-  if (diagonal == NULL) {
-    return clt_fail(error, CLT_FAILED, "no memory for the light of %zu cells", far->cells);
-  }
+/* inverse = 1 / D at lit cells, else 0; where the near light of a cell is less than half of what it shows of itself,
+ * half of that. diagonal is room for a channel. */
+static void invert_cells(const clt_live *live, clt_far *far, double *diagonal, float *inverse) {
   for (int c = 0; c < live->info.channels; c++) {
     const unsigned char *lit = clt_certificate_lit(live->certificate, c);
     clt_transport_diagonal(live->transport, c, diagonal);
     for (size_t i = 0; i < far->cells; i++) {
       const size_t at = (size_t)c * far->cells + i;
       const double light = fmax((double)far->hierarchy->own[at], diagonal[i] / 2);
-      far->inverse[at] = lit[i] && light > 0 ? (float)(1 / light) : 0;
-      far->lit[c] += far->inverse[at] > 0;
+      inverse[at] = lit[i] && light > 0 ? (float)(1 / light) : 0;
+      far->lit[c] += inverse[at] > 0;
     }
   }
-  free(diagonal);
-  for (size_t k = 0; k < far->items; k++) {
-    measure_turnover(far, &far->item[k]);
+}
+
+static clt_status lay_out(const clt_live *live, clt_far *far, clt_error *error) {
+  double *diagonal = clt_alloc(far->cells, sizeof *diagonal);
+  float *inverse = clt_alloc(values_of(live), sizeof *inverse);
+  clt_status status = CLT_OK;
+  if (diagonal == NULL || inverse == NULL) {
+    status = clt_fail(error, CLT_FAILED, "no memory for the light of %zu cells", far->cells);
+  } else {
+    invert_cells(live, far, diagonal, inverse);
+    status = clt_live_pack(far, inverse, error);
   }
-  return CLT_OK;
+  free(diagonal);
+  free(inverse);
+  return status;
 }
 
 static clt_status create(clt_live *live, clt_error *error) {
@@ -90,26 +67,32 @@ static clt_status create(clt_live *live, clt_error *error) {
   *far = (clt_far){.hierarchy = hierarchy,
                    .kernels = clt_live_choose(),
                    .width = live->info.width,
+                   .channels = live->info.channels,
                    .cells = live->info.cols,
                    .items = hierarchy->leaves * (size_t)live->info.channels,
                    .rank = hierarchy->rank};
-  clt_status status = reserve(live, far, error);
-  for (size_t k = 0; status == CLT_OK && k < far->items; k++) {
+  far->item = clt_alloc(far->items, sizeof *far->item);
+  if (far->item == NULL) {
+    return clt_fail(error, CLT_FAILED, "no memory for moving pictures of %zu cells", far->cells);
+  }
+  for (size_t k = 0; k < far->items; k++) {
     far->item[k].channel = (int)(k / hierarchy->leaves);
     far->item[k].leaf = k % hierarchy->leaves;
   }
-  if (status == CLT_OK) {
-    status = clt_live_spread_near(far, (size_t)live->info.channels, error);
+  for (int c = 0; c < far->channels; c++) {
+    far->black[c] = clt_transport_black(live->transport, c);
   }
-  return status == CLT_OK ? invert_cells(live, far, error) : status;
+  clt_status status = lay_out(live, far, error);
+  return status == CLT_OK ? clt_newton_create(far, error) : status;
 }
 
 static void destroy(clt_live *live) {
   clt_far *far = live->own;
   if (far != NULL) {
-    clt_newton_release(far);
-    free(far->plane);
-    free(far->held);
+    clt_newton_destroy(far);
+    free(far->constant);
+    free(far->vectors);
+    free(far->around);
     free(far->spill);
     free(far->item);
     free(far);
@@ -120,53 +103,29 @@ static void reset(clt_live *live) {
   clt_far *far = live->own;
   far->now = far->best = 0;
   memset(far->drive[0], 0, values_of(live) * sizeof(float));
+  memset(far->shown, 0, far->strips * CLT_LIVE_LANES * sizeof(float));
   memset(far->q, 0, (size_t)live->info.channels * far->rank * sizeof *far->q);
   memset(far->mean, 0, sizeof far->mean);
+  memset(far->pulled, 0, sizeof far->pulled);
   for (size_t k = 0; k < far->items; k++) {
     memset(far->item[k].far, 0, sizeof far->item[k].far);
     memset(far->item[k].pull, 0, sizeof far->item[k].pull);
+    far->item[k].seen = 0;
   }
 }
 
-/* Fills what is wanted; returns its square over lit cells. */
-static double want(const clt_live *live, clt_far *far, const float *target) {
-  double sum = 0;
-  for (int c = 0; c < live->info.channels; c++) {
-    const float *black = clt_transport_black(live->transport, c), *from = target + (size_t)c * far->cells;
-    float *wanted = far->wanted + (size_t)c * far->cells;
-    const float *inverse = far->inverse + (size_t)c * far->cells;
-    for (size_t i = 0; i < far->cells; i++) {
-      wanted[i] = from[i] - black[i];
-      sum += inverse[i] > 0 ? (double)wanted[i] * (double)wanted[i] : 0;
-    }
-  }
-  return sum;
-}
-
-/* The residual and gap of the drive as it stands. */
-static void look(const clt_live *live, clt_far *far, frame *at) {
-#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE)
-  for (size_t k = 0; k < far->items; k++) {
-    far->kernels->look(far, &far->item[k]);
-  }
+/* What a pass over the cells has found of the drive as it stands. */
+static void add_up(clt_far *far, frame *at) {
   const double before = at->gap;
-  at->objective = at->gap = at->seen = 0;
+  at->objective = at->gap = at->seen = at->wanted = 0;
   at->held = 0;
   for (size_t k = 0; k < far->items; k++) {
     at->objective += far->item[k].residual;
     at->gap += far->item[k].gap;
     at->seen += far->item[k].seen;
-    at->held += far->item[k].held_cells;
+    at->wanted += far->item[k].wanted;
+    at->held += (double)far->item[k].held[0];
   }
-  double drift[CLT_CHANNELS_MAX] = {0}, drifts = 0;
-#pragma omp parallel for schedule(dynamic, 1)
-  for (int c = 0; c < live->info.channels; c++) {
-    drift[c] = clt_newton_drift(far, c);
-  }
-  for (int c = 0; c < live->info.channels; c++) {
-    drifts += drift[c];
-  }
-  at->gap += drifts + 2 * sqrt(at->gap * drifts);
   at->renew = before > 0 && at->gap > SLOW * SLOW * before;
   at->stale = at->objective < at->least ? 0 : at->stale + 1;
   if (at->objective < at->least) {
@@ -175,24 +134,67 @@ static void look(const clt_live *live, clt_far *far, frame *at) {
   }
 }
 
-/* Takes the factor of a channel anew where other cells are held than it knows of. */
+/* The residual and gap of the drive that is known, for the target. */
+static void aim(clt_far *far, frame *at) {
+#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE)
+  for (size_t k = 0; k < far->items; k++) {
+    far->kernels->aim(far, &far->item[k]);
+  }
+  add_up(far, at);
+}
+
+/* The same of the drive that was changed. */
+static void look(clt_far *far, frame *at, clt_live_result *result) {
+  const int64_t since_ns = clt_clock_ns();
+#pragma omp parallel
+  {
+    clt_newton_gather(far);
+#pragma omp for schedule(dynamic, ITEMS_AT_ONCE)
+    for (size_t k = 0; k < far->items; k++) {
+      clt_newton_light(far, &far->item[k]);
+      far->kernels->look(far, &far->item[k]);
+    }
+  }
+  add_up(far, at);
+  result->ms[CLT_LIVE_ESTIMATE] += 1e3 * clt_clock_since(since_ns);
+}
+
+/* Whether the drive is near enough to the best. The gap has two parts: what the cells would do by q, and by how much
+ * that changes with q; the second is asked for only where the first is small. */
+static bool is_near(clt_far *far, const frame *at, double enough, clt_live_result *result) {
+  if (sqrt(at->gap) > enough) {
+    return false;
+  }
+  const int64_t since_ns = clt_clock_ns();
+  double drift[CLT_CHANNELS_MAX] = {0}, drifts = 0;
+#pragma omp parallel
+  clt_newton_drift(far, drift);
+  for (int c = 0; c < far->channels; c++) {
+    drifts += drift[c];
+  }
+  result->ms[CLT_LIVE_ESTIMATE] += 1e3 * clt_clock_since(since_ns);
+  return sqrt(at->gap) + sqrt(drifts) <= enough;
+}
+
+/* Takes the factor of a channel anew where other cells are held than it knows of: by leaves, for it knows no cells.
+ * That of no held cell is always there. */
 static bool keep_factor(clt_far *far, int channel, bool renew) {
   const size_t leaves = far->hierarchy->leaves, first = (size_t)channel * leaves;
-  long changed = 0;
+  double changed = 0, held = 0;
   for (size_t k = first; k < first + leaves; k++) {
-    changed += far->item[k].changed;
+    const clt_live_item *item = &far->item[k];
+    float most = 0;
+    for (int t = 0; t < CLT_LEAF_TERMS; t++) {
+      most = fmaxf(most, fabsf(item->held[t] - item->known[t]));
+    }
+    changed += (double)most;
+    held += (double)item->held[0];
   }
-  if (far->ready[channel] && (changed == 0 || (!renew && (double)changed <= MOVED * (double)far->lit[channel]))) {
-    return true;
-  }
-#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE)
-  for (size_t k = first; k < first + leaves; k++) {
-    far->kernels->weigh(far, &far->item[k]);
-  }
-  const size_t at = (size_t)channel * far->cells;
-  memcpy(far->factored + at, far->held + at, far->cells);
-  far->ready[channel] = clt_newton_factor(far, channel);
-  return far->ready[channel];
+  far->bound[channel] = held > 0;
+  far->pulled[channel] = far->pulled[channel] || held > 0;
+  return held == 0 ||
+         (far->ready[channel] && (changed == 0 || (!renew && changed <= MOVED * (double)far->lit[channel]))) ||
+         clt_newton_factor(far, channel);
 }
 
 /* What the drive gives over an item, as `move` leaves it. */
@@ -217,13 +219,10 @@ static void give(const clt_far *far, clt_live_item *item) {
 }
 
 /* After the drive was changed otherwise than by a step. */
-static void give_again(const clt_live *live, clt_far *far) {
+static void give_again(clt_far *far) {
 #pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE)
   for (size_t k = 0; k < far->items; k++) {
     give(far, &far->item[k]);
-  }
-  for (int c = 0; c < live->info.channels; c++) {
-    clt_newton_gather(far, c);
   }
 }
 
@@ -234,32 +233,24 @@ static void halve(const clt_live *live, clt_far *far) {
   for (size_t at = 0; at < values_of(live); at++) {
     x[at] = 0.5f * (x[at] + best[at]);
   }
-  give_again(live, far);
+  give_again(far);
 }
 
 /* One Newton step of every channel, into the drive that is neither the last nor the best. */
-static bool step(const clt_live *live, clt_far *far, bool renew) {
-  const int channels = live->info.channels, next = far->now != 0 && far->best != 0   ? 0
-                                                   : far->now != 1 && far->best != 1 ? 1
-                                                                                     : 2;
-  for (int c = 0; c < channels; c++) {
+static bool step(clt_far *far, bool renew) {
+  const int next = far->now != 0 && far->best != 0 ? 0 : far->now != 1 && far->best != 1 ? 1 : 2;
+  for (int c = 0; c < far->channels; c++) {
     if (!keep_factor(far, c, renew)) {
       return false;
     }
   }
 #pragma omp parallel
   {
-#pragma omp for schedule(dynamic, 1)
-    for (int c = 0; c < channels; c++) {
-      clt_newton_step(far, c);
-    }
+    clt_newton_step(far);
 #pragma omp for schedule(dynamic, ITEMS_AT_ONCE)
     for (size_t k = 0; k < far->items; k++) {
+      clt_newton_turn(far, &far->item[k]);
       far->kernels->move(far, &far->item[k], far->drive[next]);
-    }
-#pragma omp for schedule(dynamic, 1)
-    for (int c = 0; c < channels; c++) {
-      clt_newton_gather(far, c);
     }
   }
   far->now = next;
@@ -272,34 +263,26 @@ static bool may_go_on(const clt_live *live, const frame *at, int steps) {
   return steps < STEPS_MAX && at->stale < STALE_STEPS && !(budget > 0 && spent > budget);
 }
 
-static void timed_look(const clt_live *live, clt_far *far, frame *at, clt_live_result *result) {
-  const int64_t since_ns = clt_clock_ns();
-  look(live, far, at);
-  result->ms[CLT_LIVE_ESTIMATE] += 1e3 * clt_clock_since(since_ns);
-}
-
 /* From a drive of 0, at which ||b|| is left. There the bounds say little of which cells they will hold. */
-static void start_cold(clt_live *live, clt_far *far, frame *at, clt_live_result *result) {
+static void start_cold(clt_live *live, clt_far *far, frame *at) {
   reset(live);
   at->cold = true;
   at->gap = 0;
   at->least = INFINITY;
   far->open = true;
-  timed_look(live, far, at, result);
-  far->open = false;
+  aim(far, at);
 }
 
 /* Steps until the gap is closed; the residual of the drive that is kept is known then. A start that is worse than none,
  * and one from which steps cease to gain, is given up for a cold one. */
 static void run(clt_live *live, clt_far *far, frame *at, clt_live_result *result) {
-  const double wanted = live->options.target_error * at->size;
-  timed_look(live, far, at, result);
-  if (at->objective >= at->wanted && at->gap > wanted * wanted) {
-    start_cold(live, far, at, result);
+  const double enough = live->options.target_error * live->size;
+  if (at->objective >= at->wanted && at->gap > enough * enough) {
+    start_cold(live, far, at);
   }
-  while (!(result->converged = sqrt(at->gap) <= wanted)) {
+  while (!(result->converged = is_near(far, at, enough, result))) {
     if (at->stale >= STALE_STEPS && !at->cold) {
-      start_cold(live, far, at, result);
+      start_cold(live, far, at);
     }
     const int64_t since_ns = clt_clock_ns();
     if (!may_go_on(live, at, result->steps)) {
@@ -307,42 +290,45 @@ static void run(clt_live *live, clt_far *far, frame *at, clt_live_result *result
     }
     if (at->objective > WORSE * at->least) {
       halve(live, far);
-    } else if (!step(live, far, at->renew)) {
+    } else if (!step(far, at->renew)) {
       break;
     }
+    far->open = false;
     result->steps++;
     result->ms[CLT_LIVE_SOLVE] += 1e3 * clt_clock_since(since_ns);
-    timed_look(live, far, at, result);
+    look(far, at, result);
     at->last_s = clt_clock_since(since_ns);
   }
+  far->open = false;
 }
 
 /* After steps that ceased to gain. */
-static void return_to_best(const clt_live *live, clt_far *far) {
+static void return_to_best(clt_far *far, frame *at, clt_live_result *result) {
   far->now = far->best;
-  give_again(live, far);
+  give_again(far);
+  look(far, at, result);
 }
 
 static clt_status solve_frame(clt_live *live, const float *target, float *drive, clt_live_result *result,
                               clt_error *error) {
   (void)error;
   clt_far *far = live->own;
-  frame at = {.size = clt_live_size(live, target), .least = INFINITY};
-  at.wanted = want(live, far, target);
+  frame at = {.least = INFINITY};
+  far->target = target;
+  aim(far, &at);
   result->ms[CLT_LIVE_PREPARE] = 1e3 * clt_clock_since(live->start_ns);
   run(live, far, &at, result);
   if (!result->converged && far->now != far->best) {
-    return_to_best(live, far);
-    at.objective = at.least;
+    return_to_best(far, &at, result);
   }
   memcpy(drive, far->drive[far->now], values_of(live) * sizeof *drive);
   size_t lit = 0;
   for (int c = 0; c < live->info.channels; c++) {
     lit += far->lit[c];
   }
-  result->residual = sqrt(at.objective) / at.size;
-  result->clipped_fraction = lit > 0 ? (double)at.held / (double)lit : 0;
-  live->seen = sqrt(at.seen) / at.size;
+  result->residual = sqrt(at.objective) / live->size;
+  result->clipped_fraction = lit > 0 ? at.held / (double)lit : 0;
+  live->seen = sqrt(at.seen) / live->size;
   return CLT_OK;
 }
 

@@ -1,5 +1,5 @@
-/* Passes over the cells of a leaf, row by row. Sums are kept for every column of the leaf and folded at its end, so
- * that the loops over a row are maps, which compilers turn into vector instructions. */
+/* Passes over the cells of a leaf, strip by strip of eight cells, down the rows. Vectors are those of the compiler: it
+ * breaks them up where the processor has shorter ones, and their sums stay in registers. */
 #include <math.h>
 #include <string.h>
 
@@ -7,276 +7,436 @@
 
 #define INLINE static inline __attribute__((always_inline)) /* into each variant */
 
-enum { SIDE = CLT_LEAF_SIDE_MAX };
+enum { LANES = CLT_LIVE_LANES };
+typedef float lanes __attribute__((vector_size(LANES * sizeof(float))));
+typedef int32_t marks __attribute__((vector_size(LANES * sizeof(int32_t)))); /* all bits or none */
 
-/* Sums of a value over the rows of a leaf, by columns: with 1 and with v. */
+/* Vectors pass by pointers: how they pass by value depends on the processor. */
+INLINE void take(lanes *to, const float *from) {
+  memcpy(to, from, sizeof *to);
+}
+
+INLINE void take_plane(lanes *to, const float *constant, clt_live_plane plane) {
+  memcpy(to, constant + (size_t)plane * LANES, sizeof *to);
+}
+
+/* The first `count` lanes; 0 in the others. */
+INLINE void take_part(lanes *to, const float *from, int32_t count) {
+  if (count == LANES) {
+    memcpy(to, from, sizeof *to);
+    return;
+  }
+  float part[LANES] = {0};
+  for (int32_t l = 0; l < count; l++) {
+    part[l] = from[l];
+  }
+  memcpy(to, part, sizeof *to);
+}
+
+INLINE void put_part(float *to, const lanes *from, int32_t count) {
+  if (count == LANES) {
+    memcpy(to, from, sizeof *from);
+    return;
+  }
+  float part[LANES];
+  memcpy(part, from, sizeof part);
+  for (int32_t l = 0; l < count; l++) {
+    to[l] = part[l];
+  }
+}
+
+INLINE void clip(lanes *value) {
+  const lanes none = {0}, one = none + 1;
+  *value = (lanes)((marks)*value & (*value > none));
+  const marks below = *value < one;
+  *value = (lanes)(((marks)*value & below) | ((marks)one & ~below));
+}
+
+/* A strip of an item on its way down the rows. */
+typedef struct strip {
+  int32_t count;          /* of its lanes that are cells */
+  size_t cell, at, place; /* in a plane of a channel and of all channels, and among strips of rows */
+  size_t width;           /* of the grid: from row to row */
+  lanes u;
+} strip;
+
+INLINE void begin_strip(const clt_far *far, const clt_live_item *item, const clt_leaf *leaf, int32_t across, strip *s) {
+  const int32_t left = leaf->width - across;
+  s->count = left < LANES ? left : LANES;
+  s->width = (size_t)far->width;
+  s->cell = (size_t)leaf->y * s->width + (size_t)(leaf->x + across);
+  s->at = (size_t)item->channel * far->cells + s->cell;
+  s->place = item->first + (size_t)(across / LANES * leaf->height);
+  for (int32_t l = 0; l < LANES; l++) {
+    s->u[l] = (float)clt_leaf_place(across + l, leaf->width);
+  }
+}
+
+INLINE void next_row(strip *s) {
+  s->cell += s->width;
+  s->at += s->width;
+  s->place++;
+}
+
+/* What a bilinear function is along a row. */
+INLINE void spread(lanes *to, const float term[CLT_LEAF_TERMS], float v, const lanes *u) {
+  *to = (term[0] + v * term[2]) + (term[1] + v * term[3]) * *u;
+}
+
+/* Sums of a value over the rows of a strip, by columns: with 1 and with v. */
 typedef struct columns {
-  float even[SIDE], tilted[SIDE];
+  lanes even, tilted;
 } columns;
 
-/* Where a row of an item's cells begins, in a plane of a channel and of all channels. */
-typedef struct place {
-  size_t cell, at;
-} place;
-
-INLINE place place_of(const clt_far *far, const clt_live_item *item, int32_t row) {
-  const clt_leaf *leaf = &far->hierarchy->leaf[item->leaf];
-  const size_t cell = (size_t)(leaf->y + row) * (size_t)far->width + (size_t)leaf->x;
-  return (place){cell, (size_t)item->channel * far->cells + cell};
+INLINE void add(columns *to, const lanes *value, float v) {
+  to->even += *value;
+  to->tilted += v * *value;
 }
 
-INLINE void fill_places(int32_t side, float *u) {
-  for (int32_t k = 0; k < side; k++) {
-    u[k] = (float)clt_leaf_place(k, side);
+INLINE void fold(const columns *sums, const lanes *u, float out[CLT_LEAF_TERMS]) {
+  const lanes across = sums->even * *u, both = sums->tilted * *u;
+  for (int l = 0; l < LANES; l++) {
+    out[0] += sums->even[l];
+    out[1] += across[l];
+    out[2] += sums->tilted[l];
+    out[3] += both[l];
   }
 }
 
-INLINE void fold(const columns *sums, const float *u, int32_t width, float out[CLT_LEAF_TERMS]) {
-  float folded[CLT_LEAF_TERMS] = {0};
-  for (int32_t k = 0; k < width; k++) {
-    folded[0] += sums->even[k];
-    folded[1] += sums->even[k] * u[k];
-    folded[2] += sums->tilted[k];
-    folded[3] += sums->tilted[k] * u[k];
+INLINE double fold_plain(const lanes *sums) {
+  double sum = 0;
+  for (int l = 0; l < LANES; l++) {
+    sum += (double)(*sums)[l];
   }
-  memcpy(out, folded, sizeof folded);
+  return sum;
 }
 
-INLINE float clip(float value) {
-  value = value > 0 ? value : 0;
-  return value < 1 ? value : 1;
-}
-
-/* near = O x over a row, by its eight directions. */
-INLINE void add_spill(const clt_far *far, place first, int32_t width, float *restrict near) {
-  const size_t line = (size_t)far->width, begin = first.at / line * line;
-  const float *restrict spill = far->spill + begin * CLT_LIVE_AROUND + (first.at - begin);
-  const float *restrict x = far->drive[far->now] + first.at, *restrict up = x - line, *restrict down = x + line;
-  for (int32_t k = 0; k < width; k++) {
-    const float above =
-        (spill[k] * up[k - 1] + spill[line + (size_t)k] * up[k]) + spill[2 * line + (size_t)k] * up[k + 1];
-    const float beside = spill[3 * line + (size_t)k] * x[k - 1] + spill[4 * line + (size_t)k] * x[k + 1];
-    const float below = (spill[5 * line + (size_t)k] * down[k - 1] + spill[6 * line + (size_t)k] * down[k]) +
-                        spill[7 * line + (size_t)k] * down[k + 1];
-    near[k] = (above + below) + beside;
+/* near = O x over a strip of a row; *spill moves on. */
+INLINE void add_spill(const clt_far *far, const strip *s, const float **spill, lanes *near) {
+  const ptrdiff_t line = (ptrdiff_t)s->width;
+  const ptrdiff_t offset[CLT_LIVE_AROUND] = {-line - 1, -line, -line + 1, -1, 1, line - 1, line, line + 1};
+  const float *x = far->drive[far->now] + s->at;
+  for (unsigned around = far->around[s->place]; around != 0; around &= around - 1) {
+    lanes share, light;
+    take(&share, *spill);
+    take(&light, x + offset[__builtin_ctz(around)]);
+    *near += share * light;
+    *spill += LANES;
   }
 }
 
-/* near = O x over a row. */
-INLINE void add_near(const clt_far *far, const clt_live_item *item, place first, int32_t width, float *near) {
+/* The same where near light comes from anywhere. */
+INLINE void add_near(const clt_far *far, const clt_live_item *item, const strip *s, const lanes *inverse, lanes *near) {
   const clt_hierarchy_storage *own = far->hierarchy;
   const float *x = far->drive[far->now] + (size_t)item->channel * far->cells;
   const float *value = own->value + (size_t)item->channel * (size_t)own->start[far->cells];
-  int64_t e = own->start[first.cell];
-  for (int32_t k = 0; k < width; k++) {
+  for (int32_t l = 0; l < s->count; l++) {
     float sum = 0;
-    for (const int64_t end = own->start[first.cell + (size_t)k + 1]; e < end; e++) {
+    for (int64_t e = own->start[s->cell + (size_t)l]; e < own->start[s->cell + (size_t)l + 1]; e++) {
       sum += value[e] * x[own->cell[e]];
     }
-    near[k] = sum;
+    (*near)[l] = (*inverse)[l] > 0 ? sum : 0;
   }
 }
 
-/* What is added up over an item: light that is given, and both right sides. */
+/* The drive to which a cell would go from r, and where it is held at a bound. */
+INLINE void want(const clt_far *far, const float *constant, const lanes *x, const lanes *r, const lanes *pull,
+                 lanes *wish, marks *held) {
+  const lanes none = {0}, one = none + 1;
+  lanes inverse, gather;
+  take_plane(&inverse, constant, CLT_LIVE_INVERSE);
+  take_plane(&gather, constant, CLT_LIVE_GATHER);
+  *wish = *x + inverse * (*r + gather * inverse * *pull);
+  const int32_t bounded = far->open ? 0 : -1;
+  *held = ((*wish <= none) | (*wish >= one)) & (inverse > none) & bounded;
+}
+
+/* What is added up over a strip. */
 typedef struct look_sums {
-  columns free, held, whole;
-  float residual[SIDE], gap[SIDE], seen[SIDE];
-  float held_cells[SIDE];
-  int changed[SIDE];
+  columns give, take, whole, held;
+  lanes residual, gap, size;
 } look_sums;
 
-/* One row: f and h are bilinear along it. */
-INLINE void look_row(const clt_far *far, const clt_live_item *item, int32_t row, int32_t width, float v,
-                     const float *restrict u, look_sums *restrict sums) {
-  const place first = place_of(far, item, row);
-  const clt_hierarchy_storage *hierarchy = far->hierarchy;
-  const float *restrict wanted = far->wanted + first.at, *restrict x = far->drive[far->now] + first.at;
-  const float *restrict own = hierarchy->own + first.at, *restrict inverse = far->inverse + first.at;
-  const float *restrict scale = hierarchy->scale + first.at, *restrict gather = hierarchy->gather + first.at;
-  const float *restrict flood = hierarchy->flood + first.at;
-  const unsigned char *restrict factored = far->factored + first.at;
-  unsigned char *restrict state = far->held + first.at;
-  float *restrict residual = far->residual + first.at;
-  const float f0 = item->far[0] + v * item->far[2], f1 = item->far[1] + v * item->far[3];
-  const float h0 = item->pull[0] + v * item->pull[2], h1 = item->pull[1] + v * item->pull[3];
-  const float mean = far->mean[item->channel];
-  const float bounded = far->open ? 0.0f : 1.0f;
-  float near[SIDE], lit[SIDE], want[SIDE], hold[SIDE];
-  if (far->spill != NULL) {
-    add_spill(far, first, width, near);
-  } else {
-    add_near(far, item, first, width, near);
-  }
-  /* loops apart: conditions that share one loop become branches, which no vector instruction takes */
-  for (int32_t k = 0; k < width; k++) {
-    lit[k] = inverse[k] > 0 ? 1.0f : 0.0f;
-  }
-  for (int32_t k = 0; k < width; k++) {
-    const float light = own[k] * x[k] + near[k] + scale[k] * (f0 + f1 * u[k]) + flood[k] * mean;
-    const float r = lit[k] * (wanted[k] - light);
-    want[k] = x[k] + inverse[k] * (r + gather[k] * inverse[k] * (h0 + h1 * u[k]));
-    residual[k] = r;
-    sums->seen[k] += lit[k] * light * light;
-  }
-  for (int32_t k = 0; k < width; k++) {
-    const float low = want[k] > 0 ? 0.0f : bounded, high = want[k] < 1 ? 0.0f : bounded;
-    hold[k] = low + high;
-  }
-  for (int32_t k = 0; k < width; k++) {
-    const float r = residual[k], step = clip(want[k]) - x[k];
-    const float give = gather[k] * (hold[k] * step + (1 - hold[k]) * (r * inverse[k]));
-    const float take = hold[k] * lit[k] * scale[k] * (r - own[k] * step);
-    sums->held_cells[k] += hold[k] * lit[k];
-    sums->free.even[k] += give;
-    sums->free.tilted[k] += v * give;
-    sums->held.even[k] += take;
-    sums->held.tilted[k] += v * take;
-    sums->whole.even[k] += scale[k] * r;
-    sums->whole.tilted[k] += v * scale[k] * r;
-    sums->residual[k] += r * r;
-    sums->gap[k] += lit[k] * (own[k] * step) * (own[k] * step);
-  }
-  for (int32_t k = 0; k < width; k++) {
-    const unsigned char holds = hold[k] > 0 ? 1 : 0;
-    sums->changed[k] += holds ^ factored[k];
-    state[k] = holds;
-  }
+/* From r on: what a cell does and how far the bounds let it go. */
+INLINE void judge(const clt_far *far, const clt_live_item *item, const strip *s, const float *constant, float v,
+                  const lanes *x, const lanes *r, look_sums *sums) {
+  const lanes none = {0}, one = none + 1;
+  lanes own, scale, gather, pull, wish;
+  marks held;
+  take_plane(&own, constant, CLT_LIVE_OWN);
+  take_plane(&scale, constant, CLT_LIVE_SCALE);
+  take_plane(&gather, constant, CLT_LIVE_GATHER);
+  spread(&pull, item->pull, v, &s->u);
+  want(far, constant, x, r, &pull, &wish, &held);
+  lanes within = wish;
+  clip(&within);
+  const lanes bounded = own * (within - *x), step = far->open ? wish - *x : within - *x;
+  const lanes give = gather * step, whole = scale * *r, rest = scale * (*r - own * step);
+  const lanes holds = (lanes)((marks)one & held);
+  add(&sums->give, &give, v);
+  add(&sums->take, &rest, v);
+  add(&sums->whole, &whole, v);
+  add(&sums->held, &holds, v);
+  sums->residual += *r * *r;
+  sums->gap += bounded * bounded;
 }
 
-INLINE void look(const clt_far *far, clt_live_item *item) {
+/* The target's part of a strip of a row: r from the light that is known. */
+INLINE void aim_row(const clt_far *far, const clt_live_item *item, const strip *s, float v, look_sums *sums) {
+  const float *constant = far->constant + s->place * CLT_LIVE_PLANES * LANES;
+  const lanes none = {0};
+  lanes target, black, light, inverse, x;
+  take_part(&target, far->target + s->at, s->count);
+  take_part(&black, far->black[item->channel] + s->cell, s->count);
+  take(&light, far->shown + s->place * LANES);
+  take(&x, far->drive[far->now] + s->at);
+  take_plane(&inverse, constant, CLT_LIVE_INVERSE);
+  const lanes wanted = (lanes)((marks)(target - black) & (inverse > none)), r = wanted - light;
+  memcpy(far->wanted + s->place * LANES, &wanted, sizeof wanted);
+  sums->size += wanted * wanted;
+  judge(far, item, s, constant, v, &x, &r, sums);
+}
+
+/* The light of the drive over a strip of a row, and r from it; the far light is bilinear along it. */
+INLINE void look_row(const clt_far *far, const clt_live_item *item, const strip *s, float v, const float **spill,
+                     look_sums *sums) {
+  const float *constant = far->constant + s->place * CLT_LIVE_PLANES * LANES;
+  lanes own, inverse, scale, flood, x, wanted, light, near = {0};
+  take_plane(&own, constant, CLT_LIVE_OWN);
+  take_plane(&inverse, constant, CLT_LIVE_INVERSE);
+  take_plane(&scale, constant, CLT_LIVE_SCALE);
+  take_plane(&flood, constant, CLT_LIVE_FLOOD);
+  take(&x, far->drive[far->now] + s->at);
+  take(&wanted, far->wanted + s->place * LANES);
+  if (far->spill != NULL) {
+    add_spill(far, s, spill, &near);
+  } else {
+    add_near(far, item, s, &inverse, &near);
+  }
+  spread(&light, item->far, v, &s->u);
+  light = own * x + near + scale * light + flood * far->mean[item->channel];
+  memcpy(far->shown + s->place * LANES, &light, sizeof light);
+  const lanes r = wanted - light;
+  sums->size += light * light;
+  judge(far, item, s, constant, v, &x, &r, sums);
+}
+
+INLINE void clear(clt_live_item *item) {
+  static const float NONE[CLT_LEAF_TERMS] = {0};
+  memcpy(item->give, NONE, sizeof NONE);
+  memcpy(item->take, NONE, sizeof NONE);
+  memcpy(item->whole, NONE, sizeof NONE);
+  memcpy(item->held, NONE, sizeof NONE);
+  item->residual = item->gap = 0;
+}
+
+INLINE void pass(const clt_far *far, clt_live_item *item, bool aims) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
-  look_sums sums = {0};
-  float u[SIDE];
-  fill_places(leaf.width, u);
-  for (int32_t row = 0; row < leaf.height; row++) {
-    look_row(far, item, row, leaf.width, (float)clt_leaf_place(row, leaf.height), u, &sums);
+  const float *spill = far->spill != NULL ? far->spill + item->block * LANES : NULL;
+  double size = 0;
+  clear(item);
+  for (int32_t across = 0; across < leaf.width; across += LANES) {
+    look_sums sums = {0};
+    strip s;
+    begin_strip(far, item, &leaf, across, &s);
+    for (int32_t row = 0; row < leaf.height; row++, next_row(&s)) {
+      const float v = (float)clt_leaf_place(row, leaf.height);
+      if (aims) {
+        aim_row(far, item, &s, v, &sums);
+      } else {
+        look_row(far, item, &s, v, &spill, &sums);
+      }
+    }
+    fold(&sums.give, &s.u, item->give);
+    fold(&sums.take, &s.u, item->take);
+    fold(&sums.whole, &s.u, item->whole);
+    fold(&sums.held, &s.u, item->held);
+    item->residual += fold_plain(&sums.residual);
+    item->gap += fold_plain(&sums.gap);
+    size += fold_plain(&sums.size);
   }
-  fold(&sums.free, u, leaf.width, item->free);
-  fold(&sums.held, u, leaf.width, item->held);
-  fold(&sums.whole, u, leaf.width, item->whole);
-  item->residual = item->gap = item->seen = 0;
-  item->changed = item->held_cells = 0;
-  for (int32_t k = 0; k < leaf.width; k++) {
-    item->residual += (double)sums.residual[k];
-    item->gap += (double)sums.gap[k];
-    item->seen += (double)sums.seen[k];
-    item->changed += sums.changed[k];
-    item->held_cells += (long)sums.held_cells[k];
-  }
+  *(aims ? &item->wanted : &item->seen) = size;
+}
+
+INLINE void move_row(const clt_far *far, const clt_live_item *item, const strip *s, float v, float *next,
+                     columns *given, lanes *light) {
+  const float *constant = far->constant + s->place * CLT_LIVE_PLANES * LANES;
+  lanes inverse, scale, gather, x, wanted, shown, turn, pull;
+  take_plane(&inverse, constant, CLT_LIVE_INVERSE);
+  take_plane(&scale, constant, CLT_LIVE_SCALE);
+  take_plane(&gather, constant, CLT_LIVE_GATHER);
+  take(&x, far->drive[far->now] + s->at);
+  take(&wanted, far->wanted + s->place * LANES);
+  take(&shown, far->shown + s->place * LANES);
+  spread(&turn, item->turn, v, &s->u);
+  spread(&pull, item->pull, v, &s->u);
+  const lanes none = {0}, r = wanted - shown;
+  lanes to = x + inverse * (r - scale * turn + gather * inverse * pull);
+  clip(&to);
+  put_part(next + s->at, &to, s->count);
+  const lanes gives = gather * to;
+  add(given, &gives, v);
+  *light += (lanes)((marks)to & (inverse > none));
 }
 
 INLINE void move(const clt_far *far, clt_live_item *item, float *next) {
-  const clt_hierarchy_storage *hierarchy = far->hierarchy;
-  const clt_leaf leaf = hierarchy->leaf[item->leaf];
-  columns given = {0};
-  float u[SIDE], light[SIDE] = {0};
-  fill_places(leaf.width, u);
-  for (int32_t row = 0; row < leaf.height; row++) {
-    const place first = place_of(far, item, row);
-    const float *restrict x = far->drive[far->now] + first.at, *restrict inverse = far->inverse + first.at;
-    const float *restrict scale = hierarchy->scale + first.at, *restrict gather = hierarchy->gather + first.at;
-    const float *restrict residual = far->residual + first.at;
-    float *restrict to = next + first.at;
-    const float v = (float)clt_leaf_place(row, leaf.height);
-    const float d0 = item->turn[0] + v * item->turn[2], d1 = item->turn[1] + v * item->turn[3];
-    const float h0 = item->pull[0] + v * item->pull[2], h1 = item->pull[1] + v * item->pull[3];
-    for (int32_t k = 0; k < leaf.width; k++) {
-      const float pull = gather[k] * inverse[k] * (h0 + h1 * u[k]);
-      to[k] = clip(x[k] + inverse[k] * (residual[k] - scale[k] * (d0 + d1 * u[k]) + pull));
-      given.even[k] += gather[k] * to[k];
-      given.tilted[k] += v * gather[k] * to[k];
-      light[k] += to[k];
-    }
-  }
-  fold(&given, u, leaf.width, item->given);
+  const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
+  memset(item->given, 0, sizeof item->given);
   item->light = 0;
-  for (int32_t k = 0; k < leaf.width; k++) {
-    item->light += (double)light[k];
+  for (int32_t across = 0; across < leaf.width; across += LANES) {
+    columns given = {0};
+    lanes light = {0};
+    strip s;
+    begin_strip(far, item, &leaf, across, &s);
+    for (int32_t row = 0; row < leaf.height; row++, next_row(&s)) {
+      move_row(far, item, &s, (float)clt_leaf_place(row, leaf.height), next, &given, &light);
+    }
+    fold(&given, &s.u, item->given);
+    item->light += fold_plain(&light);
   }
 }
 
+/* The sums of one weight with v^0, v^1 and v^2. */
+typedef struct powers {
+  lanes of[3];
+} powers;
+
+INLINE void add_powers(powers *to, const lanes *weight, float v) {
+  to->of[0] += *weight;
+  to->of[1] += v * *weight;
+  to->of[2] += v * v * *weight;
+}
+
 /* One row of the weights v k / D and (v / D)^2 where cells are free, k^2 where they are held. */
-INLINE void weigh_row(const clt_far *far, const clt_live_item *item, int32_t row, int32_t width, float v,
-                      float sums[3][3][SIDE]) {
-  const place first = place_of(far, item, row);
-  const float *restrict inverse = far->inverse + first.at;
-  const float *restrict scale = far->hierarchy->scale + first.at;
-  const float *restrict gather = far->hierarchy->gather + first.at;
-  const unsigned char *restrict state = far->held + first.at;
-  for (int32_t k = 0; k < width; k++) {
-    const float free = state[k] ? 0.0f : gather[k] * inverse[k], lit = inverse[k] > 0 ? 1.0f : 0.0f;
-    const float weight[3] = {free * scale[k], free * free, state[k] ? lit * scale[k] * scale[k] : 0.0f};
-    for (int w = 0; w < 3; w++) {
-      sums[w][0][k] += weight[w];
-      sums[w][1][k] += v * weight[w];
-      sums[w][2][k] += v * v * weight[w];
-    }
-  }
+INLINE void weigh_row(const clt_far *far, const clt_live_item *item, const strip *s, float v, powers sums[3]) {
+  const float *constant = far->constant + s->place * CLT_LIVE_PLANES * LANES;
+  lanes inverse, scale, gather, x, wanted, shown, pull, wish;
+  marks held;
+  take_plane(&inverse, constant, CLT_LIVE_INVERSE);
+  take_plane(&scale, constant, CLT_LIVE_SCALE);
+  take_plane(&gather, constant, CLT_LIVE_GATHER);
+  take(&x, far->drive[far->now] + s->at);
+  take(&wanted, far->wanted + s->place * LANES);
+  take(&shown, far->shown + s->place * LANES);
+  spread(&pull, item->pull, v, &s->u);
+  const lanes r = wanted - shown;
+  want(far, constant, &x, &r, &pull, &wish, &held);
+  const lanes free = (lanes)((marks)(gather * inverse) & ~held), bound = (lanes)((marks)scale & held);
+  const lanes both = free * scale, pulls = free * free, pushes = bound * bound;
+  add_powers(&sums[0], &both, v);
+  add_powers(&sums[1], &pulls, v);
+  add_powers(&sums[2], &pushes, v);
 }
 
 INLINE void weigh(const clt_far *far, clt_live_item *item) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
-  float sums[3][3][SIDE] = {{{0}}}, u[SIDE];
-  fill_places(leaf.width, u);
-  for (int32_t row = 0; row < leaf.height; row++) {
-    weigh_row(far, item, row, leaf.width, (float)clt_leaf_place(row, leaf.height), sums);
-  }
   memset(item->weight, 0, sizeof item->weight);
-  for (int w = 0; w < 3; w++) {
-    for (int b = 0; b < 3; b++) {
-      float *moments = item->weight[w] + 3 * b;
-      for (int32_t k = 0; k < leaf.width; k++) {
-        moments[0] += sums[w][b][k];
-        moments[1] += sums[w][b][k] * u[k];
-        moments[2] += sums[w][b][k] * u[k] * u[k];
+  for (int32_t across = 0; across < leaf.width; across += LANES) {
+    powers sums[3] = {0};
+    strip s;
+    begin_strip(far, item, &leaf, across, &s);
+    for (int32_t row = 0; row < leaf.height; row++, next_row(&s)) {
+      weigh_row(far, item, &s, (float)clt_leaf_place(row, leaf.height), sums);
+    }
+    for (int k = 0; k < 3 * 3; k++) {
+      const lanes *sum = &sums[k / 3].of[k % 3];
+      float *moment = item->weight[k / 3] + 3 * (k % 3);
+      for (int l = 0; l < LANES; l++) {
+        moment[0] += (*sum)[l];
+        moment[1] += (*sum)[l] * s.u[l];
+        moment[2] += (*sum)[l] * s.u[l] * s.u[l];
       }
     }
   }
 }
 
-static void look_portable(const clt_far *far, clt_live_item *item) {
-  look(far, item);
+INLINE void add_rows(const float *row, size_t stride, size_t count, const float term[CLT_LEAF_TERMS], float *out) {
+  const float *second = row + stride, *third = second + stride, *fourth = third + stride;
+  size_t k = 0;
+  for (; k + LANES <= count; k += LANES) {
+    lanes a, b, c, d, sum;
+    take(&a, row + k);
+    take(&b, second + k);
+    take(&c, third + k);
+    take(&d, fourth + k);
+    take(&sum, out + k);
+    sum += (term[0] * a + term[1] * b) + (term[2] * c + term[3] * d);
+    memcpy(out + k, &sum, sizeof sum);
+  }
+  for (; k < count; k++) {
+    out[k] += (term[0] * row[k] + term[1] * second[k]) + (term[2] * third[k] + term[3] * fourth[k]);
+  }
 }
 
-static void move_portable(const clt_far *far, clt_live_item *item, float *next) {
-  move(far, item, next);
+INLINE void dot_rows(const float *row, size_t stride, size_t count, const float *in, float term[CLT_LEAF_TERMS]) {
+  lanes sums[CLT_LEAF_TERMS] = {0};
+  size_t k = 0;
+  for (; k + LANES <= count; k += LANES) {
+    lanes value, times;
+    take(&times, in + k);
+    for (size_t t = 0; t < CLT_LEAF_TERMS; t++) {
+      take(&value, row + t * stride + k);
+      sums[t] += value * times;
+    }
+  }
+  for (size_t t = 0; t < CLT_LEAF_TERMS; t++) {
+    float sum = 0;
+    for (int l = 0; l < LANES; l++) {
+      sum += sums[t][l];
+    }
+    for (size_t rest = k; rest < count; rest++) {
+      sum += row[t * stride + rest] * in[rest];
+    }
+    term[t] = sum;
+  }
 }
 
-static void weigh_portable(const clt_far *far, clt_live_item *item) {
-  weigh(far, item);
-}
+/* Every pass once for each kind of processor. */
+#define VARIANT(name, attributes)                                                                                      \
+  attributes static void aim_##name(const clt_far *far, clt_live_item *item) {                                         \
+    pass(far, item, true);                                                                                             \
+  }                                                                                                                    \
+  attributes static void look_##name(const clt_far *far, clt_live_item *item) {                                        \
+    pass(far, item, false);                                                                                            \
+  }                                                                                                                    \
+  attributes static void move_##name(const clt_far *far, clt_live_item *item, float *next) {                           \
+    move(far, item, next);                                                                                             \
+  }                                                                                                                    \
+  attributes static void weigh_##name(const clt_far *far, clt_live_item *item) {                                       \
+    weigh(far, item);                                                                                                  \
+  }                                                                                                                    \
+  attributes static void add_rows_##name(const float *row, size_t stride, size_t count,                                \
+                                         const float term[CLT_LEAF_TERMS], float *out) {                               \
+    add_rows(row, stride, count, term, out);                                                                           \
+  }                                                                                                                    \
+  attributes static void dot_rows_##name(const float *row, size_t stride, size_t count, const float *in,               \
+                                         float term[CLT_LEAF_TERMS]) {                                                 \
+    dot_rows(row, stride, count, in, term);                                                                            \
+  }                                                                                                                    \
+  static const clt_live_kernels name = {.needs = NEEDS_##name,                                                         \
+                                        .runs_here = has_##name,                                                       \
+                                        .aim = aim_##name,                                                             \
+                                        .look = look_##name,                                                           \
+                                        .move = move_##name,                                                           \
+                                        .weigh = weigh_##name,                                                         \
+                                        .add_rows = add_rows_##name,                                                   \
+                                        .dot_rows = dot_rows_##name};
 
-static bool runs_everywhere(void) {
+static bool has_portable(void) {
   return true;
 }
 
-static const clt_live_kernels portable = {
-    .runs_here = runs_everywhere, .look = look_portable, .move = move_portable, .weigh = weigh_portable};
+#define NEEDS_portable NULL
+VARIANT(portable, )
 
 #if defined(__x86_64__)
-/* The same loops with vectors of eight; no fused operations, so that the bits of a drive do not depend on the
- * processor.
- */
-#define AVX2 __attribute__((target("avx2")))
-
-AVX2 static void look_avx2(const clt_far *far, clt_live_item *item) {
-  look(far, item);
-}
-
-AVX2 static void move_avx2(const clt_far *far, clt_live_item *item, float *next) {
-  move(far, item, next);
-}
-
-AVX2 static void weigh_avx2(const clt_far *far, clt_live_item *item) {
-  weigh(far, item);
-}
-
+/* Vectors of eight as they are; no fused operations, so that the bits of a drive do not depend on the processor. */
 static bool has_avx2(void) {
   return __builtin_cpu_supports("avx2");
 }
 
-static const clt_live_kernels avx2 = {
-    .needs = "AVX2", .runs_here = has_avx2, .look = look_avx2, .move = move_avx2, .weigh = weigh_avx2};
+#define NEEDS_avx2 "AVX2"
+VARIANT(avx2, __attribute__((target("avx2"))))
 
 const clt_live_kernels *const clt_live_variants[] = {&avx2, &portable, NULL};
 #else

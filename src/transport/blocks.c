@@ -4,9 +4,11 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "transport/kernels.h"
+
 /* A product walks down slices of cells, their number fixed so that sums do not depend on the number of threads, in
  * pieces that stay in the cache while the columns pass. */
-enum { SLICES = 4, PIECE = 2048 };
+enum { SLICES = 4, PIECE = 8192 };
 enum { WORTH_SHARING = 16384 }; /* values of the columns from which threads pay */
 
 /* scratch: SLICES x K partial sums, K gains, K totals, N values */
@@ -38,31 +40,39 @@ static const float *column_of(const clt_transport *transport, int channel, size_
   return own->column + ((size_t)channel * own->count + b) * transport->cols;
 }
 
-/* The sums of values over every block, weighted by the flux where it is asked for. */
-static void sum_blocks(const clt_transport *transport, const double *values, bool weighted, double *sums) {
-  const clt_block_storage *own = transport->storage;
-  memset(sums, 0, own->count * sizeof *sums);
-  for (size_t j = 0; j < transport->cols; j++) {
-    sums[own->block[j]] += weighted ? (double)own->flux[j] * values[j] : values[j];
+/* out = the sums of the slices. */
+static void fold_slices(const double *partial, size_t count, double *out) {
+  memset(out, 0, count * sizeof *out);
+  for (size_t k = 0; k < SLICES * count; k++) {
+    out[k % count] += partial[k];
   }
 }
 
-/* One piece of one column: out += gain c; returns <c, in>. */
-static double pass_column(const float *column, size_t count, double gain, const double *in, double *out) {
-  double even = 0, odd = 0;
-  size_t i = 0;
-  for (; i + 2 <= count; i += 2) {
-    double first = (double)column[i], second = (double)column[i + 1];
-    even += first * in[i];
-    odd += second * in[i + 1];
-    out[i] += gain * first;
-    out[i + 1] += gain * second;
+/* The sums of values over every block, weighted by the flux where it is asked for. */
+static void sum_blocks(const clt_transport *transport, const workspace *room, const double *values, bool weighted,
+                       double *sums) {
+  const clt_block_storage *own = transport->storage;
+  const size_t cells = transport->cols;
+  memset(room->partial, 0, SLICES * own->count * sizeof *room->partial);
+#pragma omp parallel for schedule(dynamic, 1) if (cells >= WORTH_SHARING)
+  for (size_t slice = 0; slice < SLICES; slice++) {
+    double *partial = room->partial + slice * own->count;
+    for (size_t j = cells * slice / SLICES; j < cells * (slice + 1) / SLICES; j++) {
+      partial[own->block[j]] += weighted ? (double)own->flux[j] * values[j] : values[j];
+    }
   }
-  if (i < count) {
-    even += (double)column[i] * in[i];
-    out[i] += gain * (double)column[i];
+  fold_slices(room->partial, own->count, sums);
+}
+
+/* One piece of up to four columns: out += C gain and partial += C' in. */
+static void pass_piece(const clt_pass_kernels *kernels, const float *const column[CLT_PLAIN_ROWS], size_t columns,
+                       size_t count, const double *gain, const double *in, double *out, double *partial) {
+  double sum[CLT_PLAIN_ROWS], factor[CLT_PLAIN_ROWS] = {0};
+  memcpy(factor, gain, columns * sizeof *factor);
+  kernels->pass(column, factor, in, count, sum, out);
+  for (size_t r = 0; r < columns; r++) {
+    partial[r] += sum[r];
   }
-  return even + odd;
 }
 
 /* out += C gain and total = C' in, reading the columns once. */
@@ -70,6 +80,7 @@ static void pass_columns(const clt_transport *transport, int channel, const doub
                          double *out) {
   const clt_block_storage *own = transport->storage;
   const size_t cells = transport->cols, count = own->count;
+  const clt_pass_kernels *kernels = clt_pass_choose();
   memset(room->partial, 0, SLICES * count * sizeof *room->partial);
 #pragma omp parallel for schedule(dynamic, 1) if (cells * count >= WORTH_SHARING)
   for (size_t slice = 0; slice < SLICES; slice++) {
@@ -77,18 +88,17 @@ static void pass_columns(const clt_transport *transport, int channel, const doub
     const size_t end = cells * (slice + 1) / SLICES;
     for (size_t first = cells * slice / SLICES; first < end; first += PIECE) {
       const size_t length = end - first < PIECE ? end - first : PIECE;
-      for (size_t b = 0; b < count; b++) {
-        partial[b] +=
-            pass_column(column_of(transport, channel, b) + first, length, room->gain[b], in + first, out + first);
+      for (size_t b = 0; b < count; b += CLT_PLAIN_ROWS) {
+        const size_t columns = count - b < CLT_PLAIN_ROWS ? count - b : CLT_PLAIN_ROWS;
+        const float *column[CLT_PLAIN_ROWS];
+        for (size_t r = 0; r < CLT_PLAIN_ROWS; r++) { /* behind the last column, that column again */
+          column[r] = column_of(transport, channel, r < columns ? b + r : count - 1) + first;
+        }
+        pass_piece(kernels, column, columns, length, room->gain + b, in + first, out + first, partial + b);
       }
     }
   }
-  for (size_t b = 0; b < count; b++) {
-    room->total[b] = 0;
-    for (size_t slice = 0; slice < SLICES; slice++) {
-      room->total[b] += room->partial[slice * count + b];
-    }
-  }
+  fold_slices(room->partial, count, room->total);
 }
 
 static const float *near_of(const clt_transport *transport, int channel) {
@@ -114,14 +124,16 @@ static void blocks_apply(const clt_transport *transport, int channel, const doub
   const clt_block_storage *own = transport->storage;
   workspace room = begin_turn(transport, channel);
   near_apply(transport, channel, x, y);
-  sum_blocks(transport, x, true, room.gain);
+  sum_blocks(transport, &room, x, true, room.gain);
   for (size_t b = 0; b < own->count; b++) {
     room.gain[b] *= own->inverse[b];
   }
+#pragma omp parallel for schedule(static) if (transport->cols >= WORTH_SHARING)
   for (size_t j = 0; j < transport->cols; j++) {
     room.cells[j] = (double)own->flux[j] * (x[j] - room.gain[own->block[j]]);
   }
   pass_columns(transport, channel, room.cells, &room, y);
+#pragma omp parallel for schedule(static) if (transport->cols >= WORTH_SHARING)
   for (size_t i = 0; i < transport->rows; i++) {
     y[i] += own->inverse[own->block[i]] * room.total[own->block[i]];
   }
@@ -132,13 +144,13 @@ static void blocks_apply(const clt_transport *transport, int channel, const doub
 static void blocks_apply_transposed(const clt_transport *transport, int channel, const double *y, double *x) {
   const clt_block_storage *own = transport->storage;
   workspace room = begin_turn(transport, channel);
-  sum_blocks(transport, y, false, room.gain);
+  sum_blocks(transport, &room, y, false, room.gain);
   for (size_t b = 0; b < own->count; b++) {
     room.gain[b] *= own->inverse[b];
   }
   memset(room.cells, 0, transport->cols * sizeof *room.cells);
   pass_columns(transport, channel, y, &room, room.cells);
-  sum_blocks(transport, room.cells, true, room.gain);
+  sum_blocks(transport, &room, room.cells, true, room.gain);
   for (size_t j = 0; j < transport->cols; j++) {
     const int32_t b = own->block[j];
     x[j] = (double)own->flux[j] * (own->inverse[b] * (room.total[b] - room.gain[b]) + room.cells[j]);
@@ -160,7 +172,7 @@ static void blocks_diagonal(const clt_transport *transport, int channel, double 
   for (size_t i = 0; i < transport->cols; i++) {
     room.cells[i] = (double)column_of(transport, channel, (size_t)own->block[i])[i];
   }
-  sum_blocks(transport, room.cells, true, room.total);
+  sum_blocks(transport, &room, room.cells, true, room.total);
   for (size_t i = 0; i < transport->rows; i++) {
     const int32_t a = own->block[i];
     const double mean = room.total[a] * own->inverse[a];

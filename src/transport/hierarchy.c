@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "transport/kernels.h"
+
 enum { WORTH_SHARING = 16384 }; /* cells from which threads pay */
 
 /* One side of the far light: what cells are multiplied by, and the factor between leaves and ranks. */
@@ -25,61 +27,82 @@ static side side_of(const clt_transport *transport, int channel, const float *ce
                 factor + (size_t)channel * CLT_LEAF_TERMS * own->leaves * own->rank};
 }
 
-/* m = P' diag(cells) x over one leaf; x = NULL stands for 1 everywhere. */
+static void fill_places(int32_t count, double *u) {
+  for (int32_t k = 0; k < count; k++) {
+    u[k] = clt_leaf_place(k, count);
+  }
+}
+
+/* m = P' diag(cells) x over one leaf; x = NULL stands for 1 everywhere. Sums are kept by columns, so that the loop over
+ * a row is a map. */
 static void sum_leaf(const clt_leaf *leaf, int width, const float *cells, const double *x, double m[CLT_LEAF_TERMS]) {
-  memset(m, 0, CLT_LEAF_TERMS * sizeof *m);
+  double even[CLT_LEAF_SIDE_MAX] = {0}, tilted[CLT_LEAF_SIDE_MAX] = {0}, u[CLT_LEAF_SIDE_MAX];
   for (int32_t row = 0; row < leaf->height; row++) {
     const size_t first = (size_t)(leaf->y + row) * (size_t)width + (size_t)leaf->x;
-    double even = 0, tilted = 0;
+    const double v = clt_leaf_place(row, leaf->height);
     for (int32_t k = 0; k < leaf->width; k++) {
       const double value = (double)cells[first + (size_t)k] * (x != NULL ? x[first + (size_t)k] : 1);
-      even += value;
-      tilted += value * clt_leaf_place(k, leaf->width);
+      even[k] += value;
+      tilted[k] += v * value;
     }
-    const double v = clt_leaf_place(row, leaf->height);
-    m[0] += even;
-    m[1] += tilted;
-    m[2] += v * even;
-    m[3] += v * tilted;
+  }
+  fill_places(leaf->width, u);
+  memset(m, 0, CLT_LEAF_TERMS * sizeof *m);
+  for (int32_t k = 0; k < leaf->width; k++) {
+    m[0] += even[k];
+    m[1] += even[k] * u[k];
+    m[2] += tilted[k];
+    m[3] += tilted[k] * u[k];
   }
 }
 
 /* y += diag(cells) P f over one leaf. */
 static void spread_leaf(const clt_leaf *leaf, int width, const float *cells, const double f[CLT_LEAF_TERMS],
                         double *y) {
+  double u[CLT_LEAF_SIDE_MAX];
+  fill_places(leaf->width, u);
   for (int32_t row = 0; row < leaf->height; row++) {
     const size_t first = (size_t)(leaf->y + row) * (size_t)width + (size_t)leaf->x;
     const double v = clt_leaf_place(row, leaf->height), even = f[0] + v * f[2], tilted = f[1] + v * f[3];
     for (int32_t k = 0; k < leaf->width; k++) {
-      y[first + (size_t)k] += (double)cells[first + (size_t)k] * (even + tilted * clt_leaf_place(k, leaf->width));
+      y[first + (size_t)k] += (double)cells[first + (size_t)k] * (even + tilted * u[k]);
     }
+  }
+}
+
+static void rows_of(const float *factor, size_t leaf, size_t rank, const float *row[CLT_PLAIN_ROWS]) {
+  for (size_t term = 0; term < CLT_LEAF_TERMS; term++) {
+    row[term] = factor + (CLT_LEAF_TERMS * leaf + term) * rank;
   }
 }
 
 /* y += diag(to) P to.factor from.factor' P' diag(from) x */
 static void far_product(const clt_transport *transport, int channel, side from, side to, const double *x, double *y) {
   const clt_hierarchy_storage *own = transport->storage;
-  const size_t nodes = CLT_LEAF_TERMS * own->leaves, rank = own->rank;
-  double *node = own->scratch + (size_t)channel * (nodes + rank), *z = node + nodes;
-#pragma omp parallel for schedule(static) if (transport->cols >= WORTH_SHARING)
-  for (size_t leaf = 0; leaf < own->leaves; leaf++) {
-    sum_leaf(&own->leaf[leaf], transport->width, from.cells, x, node + CLT_LEAF_TERMS * leaf);
-  }
-  memset(z, 0, rank * sizeof *z);
-  for (size_t m = 0; m < nodes; m++) {
-    for (size_t r = 0; r < rank; r++) {
-      z[r] += node[m] * (double)from.factor[m * rank + r];
+  const clt_plain_kernels *kernels = clt_plain_choose();
+  const size_t leaves = own->leaves, rank = own->rank;
+  double *z = own->scratch + (size_t)channel * (CLT_HIERARCHY_CHUNKS + 1) * rank, *part = z + rank;
+  memset(z, 0, (CLT_HIERARCHY_CHUNKS + 1) * rank * sizeof *z);
+#pragma omp parallel for schedule(dynamic, 1) if (transport->cols >= WORTH_SHARING)
+  for (size_t chunk = 0; chunk < CLT_HIERARCHY_CHUNKS; chunk++) {
+    for (size_t leaf = leaves * chunk / CLT_HIERARCHY_CHUNKS; leaf < leaves * (chunk + 1) / CLT_HIERARCHY_CHUNKS;
+         leaf++) {
+      const float *row[CLT_PLAIN_ROWS];
+      double m[CLT_LEAF_TERMS];
+      sum_leaf(&own->leaf[leaf], transport->width, from.cells, x, m);
+      rows_of(from.factor, leaf, rank, row);
+      kernels->add_float(row, m, rank, part + chunk * rank);
     }
   }
-#pragma omp parallel for schedule(static) if (transport->cols >= WORTH_SHARING)
-  for (size_t leaf = 0; leaf < own->leaves; leaf++) {
-    double f[CLT_LEAF_TERMS] = {0};
-    for (size_t term = 0; term < CLT_LEAF_TERMS; term++) {
-      const float *row = to.factor + (CLT_LEAF_TERMS * leaf + term) * rank;
-      for (size_t r = 0; r < rank; r++) {
-        f[term] += (double)row[r] * z[r];
-      }
-    }
+  for (size_t k = 0; k < CLT_HIERARCHY_CHUNKS * rank; k++) {
+    z[k % rank] += part[k];
+  }
+#pragma omp parallel for schedule(dynamic, 8) if (transport->cols >= WORTH_SHARING)
+  for (size_t leaf = 0; leaf < leaves; leaf++) {
+    const float *row[CLT_PLAIN_ROWS];
+    double f[CLT_LEAF_TERMS];
+    rows_of(to.factor, leaf, rank, row);
+    kernels->dot_float(row, z, rank, f);
     spread_leaf(&own->leaf[leaf], transport->width, to.cells, f, y);
   }
 }

@@ -16,7 +16,11 @@
 
 #include "transport/kind.h"
 
-enum { CLT_LEAF_TERMS = 4, CLT_LEAF_SIDE_MAX = 32 };
+enum {
+  CLT_LEAF_TERMS = 4,
+  CLT_LEAF_SIDE_MAX = 32,
+  CLT_HIERARCHY_CHUNKS = 8 /* of leaves, so that sums do not depend on the number of threads */
+};
 
 typedef struct clt_leaf {
   int32_t x, y, width, height;
@@ -31,7 +35,7 @@ typedef struct clt_hierarchy_storage {
   int32_t *cell;
   float *value;    /* channels x entries */
   double error;    /* relative RMS by which a product differs from that of the transport it was made from */
-  double *scratch; /* per channel: 4L + R values */
+  double *scratch; /* per channel: CLT_HIERARCHY_CHUNKS + 1 times R values */
   pthread_mutex_t turn[CLT_CHANNELS_MAX]; /* products of one channel take turns */
 } clt_hierarchy_storage;
 

@@ -85,7 +85,7 @@ clt_status clt_hierarchic_finish(clt_transport *transport, size_t entries, const
   if (status != CLT_OK) {
     return status;
   }
-  own->scratch = clt_alloc(CLT_LEAF_TERMS * own->leaves + own->rank, (size_t)transport->channels * sizeof(double));
+  own->scratch = clt_alloc((CLT_HIERARCHY_CHUNKS + 1) * own->rank, (size_t)transport->channels * sizeof(double));
   if (own->scratch == NULL) {
     return clt_fail(error, CLT_FAILED, "%s: no memory for products over %zu leaves", source, own->leaves);
   }

@@ -26,6 +26,16 @@ typedef struct clt_plain_kernels {
   void (*add_double)(const double *const row[CLT_PLAIN_ROWS], const double y[CLT_PLAIN_ROWS], size_t count, double *x);
 } clt_plain_kernels;
 
+/* Four columns of `count` numbers at a time, for products both ways at once. */
+typedef struct clt_pass_kernels {
+  const char *needs;
+  bool (*runs_here)(void);
+  /* sum_r = sum over k < count of column_rk x_k, in 8 partial sums, and
+   * out_k += (y_0 column_0k + y_1 column_1k) + (y_2 column_2k + y_3 column_3k) */
+  void (*pass)(const float *const column[CLT_PLAIN_ROWS], const double y[CLT_PLAIN_ROWS], const double *x, size_t count,
+               double sum[CLT_PLAIN_ROWS], double *out);
+} clt_pass_kernels;
+
 /* IEEE half-precision codes, all of them finite. */
 typedef struct clt_half_kernels {
   const char *needs; /* what the processor must have; NULL: nothing */
@@ -48,10 +58,12 @@ typedef struct clt_byte_kernels {
 
 /* Every variant, the fastest first, ended by the portable one and NULL. */
 extern const clt_plain_kernels *const clt_plain_variants[];
+extern const clt_pass_kernels *const clt_pass_variants[];
 extern const clt_half_kernels *const clt_half_variants[];
 extern const clt_byte_kernels *const clt_byte_variants[];
 /* The first that runs here. */
 const clt_plain_kernels *clt_plain_choose(void);
+const clt_pass_kernels *clt_pass_choose(void);
 const clt_half_kernels *clt_half_choose(void);
 const clt_byte_kernels *clt_byte_choose(void);
 

@@ -152,7 +152,7 @@ static void test_warm(void **unused) {
   clt_live_reset(used.live);
   solve(&used, target, drive, &cold);
   for (size_t at = 0; at < VALUES; at++) {
-    target[at] *= 1 - 0.03f * (float)(at % SIDE_X) / SIDE_X;
+    target[at] *= 1 - 0.01f * (float)(at % SIDE_X) / SIDE_X;
   }
   solve(&used, target, drive, &result);
   assert_true(result.converged && result.steps < cold.steps);

@@ -40,7 +40,9 @@ static void test_report(void **unused) {
   assert_ok(clt_bench_room(WIDTH, HEIGHT, BLOCKS, 3, &room, &error), error);
   assert_ok(clt_bench(room, &options, &report, &error), error);
   assert_true(report.bandwidth_gbs > 0);
-  assert_int_equal(report.kernel_count, 3);
+  assert_int_equal(report.kernel_count, 3 + 5);
+  assert_string_equal(report.kernel[7].name, "frame: look");
+  assert_true(report.kernel[7].bytes > 3 * CELLS * 8 * sizeof(float));
   assert_true(report.kernel[0].bytes == (double)clt_transport_describe(room).bytes);
   for (int k = 0; k < report.kernel_count; k++) {
     const clt_bench_kernel *kernel = &report.kernel[k];
@@ -51,8 +53,14 @@ static void test_report(void **unused) {
   assert_true(report.frame.residual <= options.target_error && report.frame.error >= report.frame.residual);
   assert_int_equal(report.peer_count, 3);
   assert_string_equal(report.peer[0].name, "report-jacobi-csr-f32");
-  assert_true(report.peer[0].error < 0.05);
+  assert_true(report.peer[0].error <= options.target_error && report.peer[0].entries >= 128);
   assert_true(report.peer[1].error <= options.target_error && report.peer[2].error <= 2 * options.target_error);
+  for (int k = 0; k < report.peer_count; k++) {
+    const clt_bench_peer *peer = &report.peer[k];
+    assert_true(peer->ms > 0 && peer->warm_ms > 0);
+    assert_near(peer->ratio, peer->ms / report.frame.cold_ms, 1e-9 * peer->ratio);
+    assert_near(peer->warm_ratio, peer->warm_ms / report.frame.p50_ms, 1e-9 * peer->warm_ratio);
+  }
   assert_int_equal(report.point_count, 0);
   clt_transport_destroy(room);
 }

@@ -210,6 +210,37 @@ static void test_plain_variants(void **unused) {
   assert_true(clt_plain_choose()->runs_here());
 }
 
+/* Four columns both ways at once: the bits of the two kernels that go one way each. */
+static void test_pass_variants(void **unused) {
+  (void)unused;
+  enum { MOST = 512 };
+  static float column[4][MOST];
+  static double x[MOST], out[MOST], wanted[MOST];
+  uint64_t state = 6;
+  const float *const columns[] = {column[0] + 1, column[1], column[2], column[3]};
+  const double y[4] = {0.3, -0.7, 0, 1.1};
+  for (size_t count = 0; count < MOST; count += count < 40 ? 1 : 67) {
+    for (size_t k = 0; k < MOST; k++) {
+      x[k] = test_random(&state) - 0.5;
+      for (int r = 0; r < 4; r++) {
+        column[r][k] = (float)((test_random(&state) - 0.1) * exp(20 * test_random(&state) - 10));
+      }
+    }
+    double sum[4], dots[4];
+    memcpy(wanted, x, sizeof wanted);
+    clt_plain_choose()->dot_float(columns, x, count, dots);
+    clt_plain_choose()->add_float(columns, y, count, wanted);
+    for (size_t v = 0; clt_pass_variants[v] != NULL; v++) {
+      if (clt_pass_variants[v]->runs_here()) {
+        memcpy(out, x, sizeof out);
+        clt_pass_variants[v]->pass(columns, y, x, count, sum, out);
+        assert_memory_equal(sum, dots, sizeof sum);
+        assert_memory_equal(out, wanted, sizeof out);
+      }
+    }
+  }
+}
+
 static void test_byte_variants(void **unused) {
   (void)unused;
   enum { MOST = 1024, BLOCKS = MOST / CLT_BLOCK };
@@ -464,17 +495,13 @@ static void test_compensation(void **unused) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_entries),
-                                     cmocka_unit_test(test_products),
-                                     cmocka_unit_test(test_thread_count),
-                                     cmocka_unit_test(test_half_variants),
-                                     cmocka_unit_test(test_plain_variants),
-                                     cmocka_unit_test(test_byte_variants),
-                                     cmocka_unit_test(case_18_fp16_subnormal_and_overflow),
-                                     cmocka_unit_test(test_half_codes),
-                                     cmocka_unit_test(test_refusals),
-                                     cmocka_unit_test(test_from_tree),
-                                     cmocka_unit_test(case_19_sums_of_131072_terms),
-                                     cmocka_unit_test(test_compensation)};
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(test_entries),        cmocka_unit_test(test_products),
+      cmocka_unit_test(test_thread_count),   cmocka_unit_test(test_half_variants),
+      cmocka_unit_test(test_plain_variants), cmocka_unit_test(test_pass_variants),
+      cmocka_unit_test(test_byte_variants),  cmocka_unit_test(case_18_fp16_subnormal_and_overflow),
+      cmocka_unit_test(test_half_codes),     cmocka_unit_test(test_refusals),
+      cmocka_unit_test(test_from_tree),      cmocka_unit_test(case_19_sums_of_131072_terms),
+      cmocka_unit_test(test_compensation)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/memory.h"
 #include "base/order.h"
@@ -60,29 +61,50 @@ static clt_status measure_scaling(const clt_bench_options *options, clt_bench_re
   return status;
 }
 
-/* What the table of methods takes for the first picture, beside the report's iteration. */
+typedef struct method_run {
+  clt_solver *solver;
+  double *drive, *start, *wanted; /* channels x cells */
+  float *target;
+} method_run;
+
+/* Frames of the moving picture, from nothing and from the drive of the frame before. */
+static clt_status run_method(method_run *own, const clt_transport *transport, clt_bench_peer *peer, clt_error *error) {
+  const clt_transport_info info = clt_transport_describe(transport);
+  double ms[2][CLT_BENCH_TURNS];
+  clt_status status = CLT_OK;
+  for (int k = 0; status == CLT_OK && k < 2 * CLT_BENCH_TURNS; k++) {
+    const bool warm = k >= CLT_BENCH_TURNS;
+    clt_solve_result result;
+    memcpy(own->start, own->drive, (size_t)info.channels * info.cols * sizeof *own->start);
+    clt_bench_picture(transport, warm ? k + 1 - CLT_BENCH_TURNS : 0, own->drive, own->wanted, own->target);
+    status = clt_solver_run(own->solver, own->wanted, warm ? own->start : NULL, own->drive, &result, error);
+    ms[warm][k % CLT_BENCH_TURNS] = 1e3 * result.seconds;
+    peer->error = warm ? peer->error : result.residual;
+  }
+  peer->ms = clt_bench_median(ms[0], CLT_BENCH_TURNS);
+  peer->warm_ms = clt_bench_median(ms[1], CLT_BENCH_TURNS);
+  return status;
+}
+
+/* What the table of methods takes, beside the report's iteration. */
 static clt_status measure_method(const clt_transport *transport, const clt_certificate *certificate, const char *method,
                                  const clt_bench_options *options, clt_bench_peer *peer, clt_error *error) {
   const clt_transport_info info = clt_transport_describe(transport);
   const size_t values = (size_t)info.channels * info.cols;
-  double *drive = clt_alloc(values, 2 * sizeof *drive), *wanted = drive + values;
-  float *target = clt_alloc(values, sizeof *target);
+  method_run own = {.drive = clt_alloc(values, 3 * sizeof *own.drive), .target = clt_alloc(values, sizeof *own.target)};
+  own.start = own.drive + values;
+  own.wanted = own.drive + 2 * values;
   const clt_solve_options asked = {.method = method, .tolerance = options->target_error, .together = true};
-  clt_solve_result result;
-  clt_status status = drive != NULL && target != NULL
-                          ? CLT_OK
+  snprintf(peer->name, sizeof peer->name, "%s-%s", method, info.storage);
+  clt_status status = own.drive != NULL && own.target != NULL
+                          ? clt_solver_create(transport, certificate, &asked, &own.solver, error)
                           : clt_fail(error, CLT_FAILED, "no memory for a solve of %zu cells", info.cols);
   if (status == CLT_OK) {
-    clt_bench_picture(transport, 0, drive, wanted, target);
-    status = clt_solve(transport, certificate, wanted, &asked, drive, &result, error);
+    status = run_method(&own, transport, peer, error);
   }
-  if (status == CLT_OK) {
-    snprintf(peer->name, sizeof peer->name, "%s-%s", method, info.storage);
-    peer->ms = 1e3 * result.seconds;
-    peer->error = result.residual;
-  }
-  free(drive);
-  free(target);
+  clt_solver_destroy(own.solver);
+  free(own.drive);
+  free(own.target);
   return status;
 }
 
@@ -92,6 +114,11 @@ static clt_status measure_peers(const clt_transport *transport, const clt_certif
   static const char *const METHODS[] = {"gmres", "bounded"};
   for (size_t k = 0; status == CLT_OK && k < 2; k++) {
     status = measure_method(transport, certificate, METHODS[k], options, &report->peer[report->peer_count++], error);
+  }
+  for (int k = 0; status == CLT_OK && k < report->peer_count; k++) {
+    clt_bench_peer *peer = &report->peer[k];
+    peer->ratio = peer->ms / report->frame.cold_ms;
+    peer->warm_ratio = peer->warm_ms / report->frame.p50_ms;
   }
   return status;
 }
@@ -109,7 +136,7 @@ clt_status clt_bench(const clt_transport *transport, const clt_bench_options *op
   }
   clt_status status = clt_certify(transport, &certificate, error);
   if (status == CLT_OK) {
-    status = clt_bench_kernels(transport, report, error);
+    status = clt_bench_kernels(transport, certificate, report, error);
   }
   if (status == CLT_OK) {
     status = clt_bench_frames(transport, certificate, &asked, &report->frame, error);

@@ -6,16 +6,19 @@
 
 #include "counterlight/bench.h"
 
+enum { CLT_BENCH_TURNS = 5 }; /* of every peer, from nothing and warm */
+
 /* The picture of frame `number` that T can show: under the drive (channels x cells, room) that is filled as well. */
 void clt_bench_picture(const clt_transport *transport, int number, double *drive, double *seen, float *target);
 /* The median of count times, which are sorted. */
 double clt_bench_median(double *times, size_t count);
 
-clt_status clt_bench_kernels(const clt_transport *transport, clt_bench_report *report, clt_error *error);
+clt_status clt_bench_kernels(const clt_transport *transport, const clt_certificate *certificate,
+                             clt_bench_report *report, clt_error *error);
 clt_status clt_bench_frames(const clt_transport *transport, const clt_certificate *certificate,
                             const clt_bench_options *options, clt_bench_frame *frame, clt_error *error);
-/* The report's iteration (eq. 43) in single precision over compressed rows of 128 entries: those near, and a sample of
- * the far ones, each for its share of them. */
+/* The report's iteration (eq. 43) in single precision over compressed rows of as few entries (128, 256, ...) as make
+ * its answer as exact as target_error by all of T, within 1.25 GiB. Fills all but the ratios. */
 clt_status clt_bench_jacobi(const clt_transport *transport, double target_error, clt_bench_peer *peer,
                             clt_error *error);
 

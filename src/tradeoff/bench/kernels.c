@@ -6,6 +6,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "solve/live.h"
 #include "tradeoff/bench/bench.h"
 
 enum { REPEATS = 9, KERNELS = 3, READ_BYTES = 1 << 27 };
@@ -63,7 +64,7 @@ static uint64_t run_turn(trial *own, const clt_transport *transport, const clt_t
 
 static void tell(clt_bench_report *report, const char *what, const char *storage, double bytes, double seconds) {
   clt_bench_kernel *kernel = &report->kernel[report->kernel_count++];
-  snprintf(kernel->name, sizeof kernel->name, "%s %s", what, storage);
+  snprintf(kernel->name, sizeof kernel->name, "%s%s%s", what, storage[0] != 0 ? " " : "", storage);
   kernel->bytes = bytes;
   kernel->ms = 1e3 * seconds;
   kernel->fraction = 1e-9 * bytes / seconds / report->bandwidth_gbs;
@@ -94,7 +95,37 @@ static clt_status measure(trial *own, const clt_transport *transport, clt_bench_
   return status;
 }
 
-clt_status clt_bench_kernels(const clt_transport *transport, clt_bench_report *report, clt_error *error) {
+/* The passes that frames are made of, each after a frame. */
+static clt_status measure_passes(trial *own, const clt_transport *transport, const clt_certificate *certificate,
+                                 clt_bench_report *report, clt_error *error) {
+  const clt_transport_info info = clt_transport_describe(transport);
+  const size_t values = (size_t)info.channels * info.cols;
+  float *target = clt_alloc(values, 2 * sizeof *target);
+  double seconds[CLT_LIVE_PASSES][REPEATS];
+  clt_live_pass pass[CLT_LIVE_PASSES];
+  clt_live *live = NULL;
+  clt_live_result result;
+  bool has_passes = true;
+  clt_status status = target != NULL ? clt_live_create(transport, certificate, NULL, &live, error)
+                                     : clt_fail(error, CLT_FAILED, "no memory for frames of %zu cells", info.cols);
+  for (int turn = 0; status == CLT_OK && has_passes && turn < REPEATS; turn++) {
+    clt_bench_picture(transport, turn, own->x, own->y, target);
+    status = clt_live_solve(live, target, target + values, &result, error);
+    has_passes = status == CLT_OK && clt_live_time_passes(live, target, pass);
+    for (size_t k = 0; has_passes && k < CLT_LIVE_PASSES; k++) {
+      seconds[k][turn] = pass[k].seconds;
+    }
+  }
+  for (size_t k = 0; status == CLT_OK && has_passes && k < CLT_LIVE_PASSES; k++) {
+    tell(report, pass[k].name, "", pass[k].bytes, clt_bench_median(seconds[k], REPEATS));
+  }
+  clt_live_destroy(live);
+  free(target);
+  return status;
+}
+
+clt_status clt_bench_kernels(const clt_transport *transport, const clt_certificate *certificate,
+                             clt_bench_report *report, clt_error *error) {
   const clt_transport_info info = clt_transport_describe(transport);
   const size_t values = (size_t)info.channels * info.cols;
   trial own = {.words = clt_alloc(READ_BYTES, 1), .x = clt_alloc(values, 2 * sizeof(double))};
@@ -105,6 +136,9 @@ clt_status clt_bench_kernels(const clt_transport *transport, clt_bench_report *r
   if (status == CLT_OK) {
     memset(own.words, 0, READ_BYTES); /* so that every page is there */
     status = measure(&own, transport, report, error);
+  }
+  if (status == CLT_OK) {
+    status = measure_passes(&own, transport, certificate, report, error);
   }
   free(own.words);
   free(own.x);

@@ -1,0 +1,53 @@
+/* What each pass over a hierarchy takes by itself. */
+#include "base/clock.h"
+#include "solve/live_far.h"
+
+enum { ITEMS_AT_ONCE = 8 };
+
+static double time_kernel(clt_far *far, clt_live_pass_name name, float *next) {
+  const int64_t since_ns = clt_clock_ns();
+#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE)
+  for (size_t k = 0; k < far->items; k++) {
+    clt_live_item *item = &far->item[k];
+    if (name == CLT_LIVE_PASS_AIM) {
+      far->kernels->aim(far, item);
+    } else if (name == CLT_LIVE_PASS_MOVE) {
+      far->kernels->move(far, item, next);
+    } else if (name == CLT_LIVE_PASS_LIGHT) {
+      clt_newton_light(far, item);
+    } else {
+      far->kernels->look(far, item);
+    }
+  }
+  return clt_clock_since(since_ns);
+}
+
+static double time_gather(clt_far *far) {
+  const int64_t since_ns = clt_clock_ns();
+#pragma omp parallel
+  clt_newton_gather(far);
+  return clt_clock_since(since_ns);
+}
+
+bool clt_live_time_passes(clt_live *live, const float *target, clt_live_pass pass[CLT_LIVE_PASSES]) {
+  if (live->form != &clt_live_hierarchic) {
+    return false;
+  }
+  clt_far *far = live->own;
+  const double channels = far->channels, plane = channels * (double)far->cells * sizeof(float);
+  const double strips = (double)far->strips * CLT_LIVE_LANES * sizeof(float), constant = CLT_LIVE_PLANES * strips;
+  const double factor = channels * CLT_LEAF_TERMS * (double)far->hierarchy->leaves * (double)far->rank * sizeof(float);
+  const double near = (double)far->blocks * CLT_LIVE_LANES * sizeof(float) + (double)far->strips;
+  far->target = target;
+  pass[CLT_LIVE_PASS_AIM] = (clt_live_pass){"frame: aim", constant + 2 * strips + 3 * plane, 0};
+  pass[CLT_LIVE_PASS_MOVE] = (clt_live_pass){"frame: move", constant + 2 * strips + 2 * plane, 0};
+  pass[CLT_LIVE_PASS_GATHER] = (clt_live_pass){"frame: gather", factor, 0};
+  pass[CLT_LIVE_PASS_LIGHT] = (clt_live_pass){"frame: light", factor, 0};
+  pass[CLT_LIVE_PASS_LOOK] = (clt_live_pass){"frame: look", constant + 2 * strips + plane + near, 0};
+  for (clt_live_pass_name name = CLT_LIVE_PASS_AIM; name < CLT_LIVE_PASSES; name++) {
+    pass[name].seconds =
+        name == CLT_LIVE_PASS_GATHER ? time_gather(far) : time_kernel(far, name, far->drive[(far->now + 1) % 3]);
+  }
+  live->form->reset(live);
+  return true;
+}
