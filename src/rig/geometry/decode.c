@@ -204,7 +204,10 @@ static void locate(const reading *r, const clt_blur *blur, int finest, int cell,
     out->fate = CLT_PIXEL_OUTSIDE;
     return;
   }
-  trial t = {.from = from, .count = count};
+  trial t; /* too large to be cleared as a whole at every pixel */
+  t.from = from, t.count = count, t.squares = 0;
+  memset(t.product, 0, (size_t)count * sizeof *t.product);
+  memset(t.profile, 0, (size_t)count * sizeof *t.profile);
   float cost[HYPOTHESES_MAX];
   for (int b = 0; b <= finest + 1 && b < CLT_BLUR_BITS && b < r->bits; b++, terms++) {
     add_bit(r, blur, b, b <= finest ? TRUST_FINE : TRUST_WIDER, &t);
