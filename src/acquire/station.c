@@ -180,9 +180,7 @@ clt_rig_config clt_station_rig_config(const clt_station_config *config, const cl
   if (station->calibration != NULL) {
     clt_calibration_apply(station->calibration, &measured);
   }
-  /* A cell's mean moves with the exposure where some of its pixels saturate: only whole-factor cells, whose pixels see
-   * the same light, are sure to agree. */
-  measured.verify = config->verify_given ? rig.verify : station->calibration == NULL;
+  measured.verify = config->verify_given ? rig.verify : true;
   measured.patch = rig.patch;
   if (rig.width != 0) {
     measured.width = rig.width;

@@ -13,6 +13,7 @@ static const cli_option options[] = {
     {"photo", 0, "PIC", "a photograph of the room instead"},
     {"bounces", 'n', "K", "bounces after the direct light, 0..64 (default 4)"},
     {"output", 'o', "DIR", "where the pictures go"},
+    {"calibration", 0, "FILE", "of the rig: the responses by which a .png drive is decoded"},
     {"exact-first-bounce", 0, NULL, "F = 1 / (T^-1)_ii in place of diag(T)"},
     {"tolerance", 0, "X", "relative residual of each solve (default 1e-9)"},
     {"method", 0, "NAME", "of the solves (default: pcg, or gmres where T is not reciprocal)"},
@@ -22,7 +23,8 @@ static const cli_option options[] = {
 static const char notes[] =
     "Leaves direct, bounce-1 .. bounce-K, rest (all later bounces) and picture (their sum) in DIR, each as .exr\n"
     "(radiance less black) and as .png (radiance * gain / white, sRGB-encoded), and summary.json, which has the gain\n"
-    "of each. A .png or .jpg drive holds panel values; a .png or .jpg photo is radiance / white, .exr and .npy are\n"
+    "of each. A .png or .jpg drive holds panel values, after the projector's response that the transport file names,\n"
+    "or the responses and crosstalk of --calibration; a .png or .jpg photo is radiance / white, .exr and .npy are\n"
     "linear. Of a photo the transport's black is taken off.\n"
     "energy is the sum over cells and channels, share its part of the picture's, negative the part of a term's\n"
     "magnitude that lies below 0, sum_error ||direct + bounces + rest - picture|| / ||picture||. eq51_difference is\n"
@@ -31,7 +33,7 @@ static const char notes[] =
     "cells). inexact says that the scene is none of flat diffuse patches, and why.\n";
 
 typedef struct task {
-  const char *drive_path, *photo_path, *output;
+  const char *drive_path, *photo_path, *output, *calibration;
   char folder[CLT_PATH_MAX];
   int count;
   clt_interreflection_options how;
@@ -45,6 +47,7 @@ typedef struct task {
 static clt_status read_options(const cli_command *command, const cli_arguments *arguments, task *t, clt_error *error) {
   t->drive_path = cli_value(command, arguments, "drive");
   t->photo_path = cli_value(command, arguments, "photo");
+  t->calibration = cli_value(command, arguments, "calibration");
   t->how.exact_first_bounce = cli_value(command, arguments, "exact-first-bounce") != NULL;
   t->how.method = cli_value(command, arguments, "method");
   t->count = 4;
@@ -167,6 +170,9 @@ static void print_terms(const task *t) {
 
 static clt_status run_task(const cli_arguments *arguments, task *t, clt_error *error) {
   clt_status status = cli_input_open(arguments->positional[0], &t->input, error);
+  if (!status) {
+    status = cli_input_calibrate(t->calibration, &t->input, error);
+  }
   if (!status) {
     status = take_apart(t, arguments->json, error);
   }

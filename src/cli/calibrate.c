@@ -36,7 +36,7 @@ static const char notes[] =
     "coverage.png shows decoded pixels by their place on the panel, and masked ones by cause: black unlit, white\n"
     "saturated, blue ambiguous, magenta outside the panel, yellow isolated, cyan lit from two places.\n"
     "Distances are those of camera pixels from the epipolar lines of --reference, or without one of the map's own\n"
-    "fundamental matrix.\n";
+    "fundamental matrix. A lens that the calibration in --output has is kept, and straightened for them.\n";
 
 static clt_status read_panel(const char *text, cli_calibrate *t, clt_error *error) {
   int end = 0;
@@ -122,8 +122,10 @@ static void check_epipolar(cli_calibrate *t) {
     return; /* findings say so */
   }
   cli_progress_note(&t->progress, "epipolar distances");
-  if (clt_epipolar_check(&t->found.geometry.map, t->reference != NULL ? &t->stereo : NULL, &t->found.epipolar,
-                         &error)) {
+  clt_lens lens;
+  bool known = t->found.whole != NULL && cli_calibration_lens(&t->found.whole->info, &lens);
+  if (clt_epipolar_check(&t->found.geometry.map, t->reference != NULL ? &t->stereo : NULL, known ? &lens : NULL,
+                         &t->found.epipolar, &error)) {
     clt_findings_add(&t->found.findings, false, "the map was not checked: %s", error.message);
   }
 }
@@ -159,6 +161,9 @@ static clt_status measure(cli_calibrate *t, clt_error *error) {
   }
   if (!status) {
     status = whole ? cli_calibrate_whole(t, error) : cli_calibrate_geometry(t, error);
+  }
+  if (!status && t->found.whole != NULL) {
+    status = cli_calibrate_keep_lens(t, error);
   }
   if (!status) {
     check_epipolar(t);

@@ -29,6 +29,11 @@ clt_status cli_calibrate_geometry(cli_calibrate *task, clt_error *error);
 /* Calibrates on the station's devices, or on the recording of a whole calibration, into found.whole. */
 clt_status cli_calibrate_whole(cli_calibrate *task, clt_error *error);
 
+/* The lens of a calibration; false where none was measured. */
+bool cli_calibration_lens(const clt_calibration_info *info, clt_lens *lens);
+/* Takes over the lens of the calibration that is in the folder already, where that is of a camera of the same size, and
+ * says so in the findings. CLT_FAILED where the path is too long. */
+clt_status cli_calibrate_keep_lens(cli_calibrate *task, clt_error *error);
 /* The lens by photographs of a chessboard, into a calibration that is there. An exit code. */
 int cli_calibrate_lens(const cli_command *command, const cli_arguments *arguments);
 

@@ -94,6 +94,40 @@ static clt_status measure(const char *folder, task *t, clt_error *error) {
   return status ? status : keep(t, error);
 }
 
+bool cli_calibration_lens(const clt_calibration_info *info, clt_lens *lens) {
+  const double *l = info->lens;
+  *lens = (clt_lens){.fx = l[0], .fy = l[1], .cx = l[2], .cy = l[3]};
+  memcpy(lens->distortion, l + 4, sizeof lens->distortion);
+  return l[0] > 0;
+}
+
+clt_status cli_calibrate_keep_lens(cli_calibrate *t, clt_error *error) {
+  char path[CLT_PATH_MAX];
+  clt_calibration *before = NULL;
+  clt_calibration_info *made = &t->found.whole->info;
+  clt_lens lens;
+  clt_status status = clt_file_join(t->folder, "calibration.h5", path, error);
+  if (status || clt_calibration_load(path, &before, NULL)) {
+    return status; /* nothing is there that could be kept */
+  }
+  const clt_calibration_info *info = &before->info;
+  if (cli_calibration_lens(info, &lens)) {
+    bool same = info->camera_width == made->camera_width && info->camera_height == made->camera_height;
+    if (same) {
+      memcpy(made->lens, info->lens, sizeof made->lens);
+      made->lens_reprojection = info->lens_reprojection;
+    }
+    clt_findings_add(&t->found.findings, false, "%s",
+                     same
+                         ? "the lens that was measured before is kept; if the camera, its lens or its focus is another "
+                           "one now, measure it again by --lens"
+                         : "the lens that was measured before is dropped: the camera's pixels are others; measure it "
+                           "again by --lens");
+  }
+  clt_calibration_destroy(before);
+  return CLT_OK;
+}
+
 static int answer(const cli_arguments *arguments, const task *t) {
   const clt_lens *lens = &t->lens;
   const double *k = lens->distortion;

@@ -150,7 +150,9 @@ static void put_geometry(FILE *page, const cli_calibration *found) {
           found->roughness);
   if (epipolar->count > 0) {
     put_row(page, "Epipolar distance, median",
-            epipolar->fitted ? "camera pixels, of lines fitted to the map itself, lenses taken as straight"
+            epipolar->fitted ? found->whole->info.lens[0] > 0
+                                   ? "camera pixels, of lines fitted to the map itself, the camera's lens straightened"
+                                   : "camera pixels, of lines fitted to the map itself, lenses taken as straight"
                              : "camera pixels, of the lines of the given calibration",
             "%.3f", epipolar->median);
     put_row(page, "Epipolar distance, 90 %", "camera pixels", "%.3f", epipolar->upper);

@@ -14,6 +14,7 @@ static const cli_option options[] = {
     {"output", 'o', "OUT", "where the map of new over old reflectance goes (.npy, .exr, .png)"},
     {"predict", 0, "SEEN", "also: what the room now looks like under --light"},
     {"light", 'l', "PIC", "a drive for --predict (default: --drive)"},
+    {"calibration", 0, "FILE", "of the rig: the responses by which .png drives are decoded"},
     {"exact-first-bounce", 0, NULL, "F = 1 / (T^-1)_ii in place of diag(T)"},
     {"tolerance", 0, "X", "relative residual of the solves (default 1e-9)"},
     {NULL, 0, NULL, NULL},
@@ -24,6 +25,8 @@ static const char notes[] =
     "the change. The ratio of a cell that too little light reaches is 1; undetermined counts them. As .png or .jpg "
     "the\n"
     "map is ratio / 2: middle grey is unchanged, white doubled. A .png or .jpg photo is radiance / white.\n"
+    "A .png or .jpg drive holds panel values, after the projector's response that the transport file names, or the\n"
+    "responses and crosstalk of --calibration.\n"
     "--predict writes b0 + T_new x (.png: over white). Of the photo the black of --black is taken off; without it the\n"
     "transport's, which the repainting may have changed too.\n"
     "With F = diag(T) light that came back to its own cell counts as direct: --exact-first-bounce is free of that and\n"
@@ -172,6 +175,9 @@ static int run(const cli_command *command, const cli_arguments *arguments) {
   clt_status status = read_options(command, arguments, &t, &error);
   if (!status) {
     status = cli_input_open(arguments->positional[0], &t.input, &error);
+  }
+  if (!status) {
+    status = cli_input_calibrate(cli_value(command, arguments, "calibration"), &t.input, &error);
   }
   if (!status) {
     status = read_light(&t, &error);

@@ -111,6 +111,24 @@ class Station(unittest.TestCase):
         by_light = np.load(seen)
         # 8 bits of an sRGB-like panel: half a code is at most 0.5 % of full light, and averages out over neighbours.
         self.assertLess(np.linalg.norm(by_codes - by_light), 0.005 * np.linalg.norm(by_light))
+        self.check_analysis(transport, calibration, drive, linear, seen)
+
+    def check_analysis(self, transport, calibration, drive, linear, seen):
+        """bounces and repaint read a measured panel's drive by its calibration, and not without."""
+        energies, ratios = [], []
+        for name, light in (("codes", drive), ("light", linear)):
+            given = ("--calibration", calibration) if light == drive else ()
+            bounces = ("bounces", transport, "--drive", light, "-n", "1", "-o", self.path("bounces-" + name), "--json")
+            repaint = ("repaint", transport, "--drive", light, "--photo", seen, "-o", self.path(name + ".npy"))
+            if given:
+                self.assertIn("give --calibration", self.run_it(*bounces, code=2).stderr)
+                self.assertIn("give --calibration", self.run_it(*repaint, code=2).stderr)
+            told = json.loads(self.run_it(*bounces, *given).stdout)
+            energies.append([term["energy"] for term in told["terms"]])
+            self.run_it(*repaint, *given)
+            ratios.append(np.load(self.path(name + ".npy")))
+        self.assertLess(np.abs(np.subtract(*energies)).max(), 0.005 * max(energies[1]))
+        self.assertLess(np.median(np.abs(ratios[0] - ratios[1])), 0.01)
 
 
 if __name__ == "__main__":

@@ -86,10 +86,23 @@ class CalibrateLive(PathTest):
             for key in ("output", "source", "calibrated", "seconds"):
                 del document[key]
         self.assertEqual(answer, replayed)
+        self.check_lens(frames, again, answer)
         self.refused("calibrate", "--scene", self.scene, "-o", self.folder / "new", "--record", frames, *HOW,
                      names="recording")
         self.refused("calibrate", "--replay", frames, "-o", self.folder / "new", "--levels", 33, *HOW[2:],
                      names="recorded for another pattern")
+
+    def check_lens(self, frames, folder, before):
+        """A lens that is in the folder's calibration already is kept, told, and used for the epipolar distances."""
+        lens = np.array([104.35, 104.35, 47.5, 35.5, -0.12, 0.02, 0.0005, -0.0004, 0.0, 0.1])
+        with h5py.File(folder / "calibration.h5", "a") as file:
+            file["camera/lens"] = lens
+        answer = answer_of("calibrate", "--replay", frames, "-o", folder, *HOW)
+        np.testing.assert_array_equal(contents(folder / "calibration.h5")["camera/lens"], lens)
+        self.assertEqual(len(answer["findings"]), len(before["findings"]) + 1)
+        self.assertIn("is kept", answer["findings"][-1]["text"])
+        kept, straight = answer["geometry"]["epipolar"], before["geometry"]["epipolar"]
+        self.assertLess(kept["median"], straight["median"])
 
     def check_photometry(self, answer):
         codes = np.linspace(0, 1, 17)

@@ -134,13 +134,13 @@ static void epipolar_distances_are_those_of_the_geometry(void **state) {
   clt_error error = {0};
   rotation(0.03, 0.2, stereo.rotation);
   make_map(&stereo, 0, &map);
-  assert_ok(clt_epipolar_check(&map, &stereo, &epipolar, &error), error);
+  assert_ok(clt_epipolar_check(&map, &stereo, NULL, &epipolar, &error), error);
   assert_int_equal(epipolar.count, 320 * 240);
   assert_true(epipolar.upper < 2e-3); /* float coordinates */
   clt_pixel_map_finish(&map);
   /* Lines are nearly along x: a panel pixel in y is nearly fy camera / fy projector camera pixels. */
   make_map(&stereo, 1, &map);
-  assert_ok(clt_epipolar_check(&map, &stereo, &epipolar, &error), error);
+  assert_ok(clt_epipolar_check(&map, &stereo, NULL, &epipolar, &error), error);
   assert_near(epipolar.median, 0.6745 * 302 / 610, 0.05);
   assert_near(epipolar.upper, 1.645 * 302 / 610, 0.12);
   assert_int_equal(epipolar.sure, 320 * 120);
@@ -156,14 +156,31 @@ static void without_a_calibration_the_map_is_checked_against_itself(void **state
   clt_error error = {0};
   rotation(0.03, 0.2, stereo.rotation);
   make_map(&stereo, 0.5, &map);
-  assert_ok(clt_epipolar_check(&map, NULL, &epipolar, &error), error);
+  assert_ok(clt_epipolar_check(&map, NULL, NULL, &epipolar, &error), error);
   assert_true(epipolar.fitted);
   assert_near(epipolar.median, 0.5 * 0.6745 * 302 / 610, 0.03);
   for (int i = 50; i < 320 * 240; i++) {
     clt_pixel_map_mask(&map, (size_t)i, CLT_PIXEL_UNLIT);
   }
-  assert_int_equal(clt_epipolar_check(&map, NULL, &epipolar, &error), CLT_BAD_INPUT);
+  assert_int_equal(clt_epipolar_check(&map, NULL, NULL, &epipolar, &error), CLT_BAD_INPUT);
   assert_non_null(strstr(error.message, "only 50"));
+  clt_pixel_map_finish(&map);
+}
+
+/* A camera's lens that bends is no fault of the map, where it is known. */
+static void a_known_lens_is_straightened_first(void **state) {
+  (void)state;
+  clt_stereo stereo = {.camera = {300, 302, 158, 121, {-0.2, 0.1, 0.001, 0.002, -0.01}},
+                       .projector = {600, 610, 320, 300, {0}},
+                       .translation = {-1.2, 0.05, 0.1}};
+  clt_pixel_map map;
+  clt_epipolar bent, straight;
+  clt_error error = {0};
+  rotation(0.03, 0.2, stereo.rotation);
+  make_map(&stereo, 0, &map);
+  assert_ok(clt_epipolar_check(&map, NULL, NULL, &bent, &error), error);
+  assert_ok(clt_epipolar_check(&map, NULL, &stereo.camera, &straight, &error), error);
+  assert_true(straight.fitted && straight.upper < 0.02 && bent.upper > 10 * straight.upper);
   clt_pixel_map_finish(&map);
 }
 
@@ -172,6 +189,7 @@ int main(void) {
       cmocka_unit_test(a_lens_is_found_from_chessboards),
       cmocka_unit_test(epipolar_distances_are_those_of_the_geometry),
       cmocka_unit_test(without_a_calibration_the_map_is_checked_against_itself),
+      cmocka_unit_test(a_known_lens_is_straightened_first),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

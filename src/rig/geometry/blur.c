@@ -5,54 +5,65 @@
 
 #include "base/memory.h"
 
-#define NARROWEST 0.15
+#define NARROWEST 0.03
 #define WIDEST 6.0
+#define LEAST_GAIN 0.7
+#define REACH 5.0 /* widths from which an edge is felt */
 
-static int period_of(int bit) {
-  return CLT_BLUR_STEPS << (bit + 2);
+enum { STEPS_LEAST = 4 };
+
+static double width_of(int index) {
+  return NARROWEST * pow(WIDEST / NARROWEST, index / (CLT_BLUR_WIDTHS - 1.0));
 }
 
-/* The profile of a square wave of period P, lit from P/4 to 3P/4, blurred by a Gaussian of deviation s:
- *   -sum over odd n of 4/(pi n) sin(pi n / 2) cos(2 pi n x / P) exp(-2 (pi n s / P)^2) */
+/* Edges are placed to a part of their width. */
+static int steps_of(double width) {
+  int steps = STEPS_LEAST;
+  while (steps * width < 2 && steps < CLT_BLUR_STEPS_MAX) {
+    steps *= 2;
+  }
+  return steps;
+}
+
+/* The profile of a square wave of period P, lit from P/4 to 3P/4, blurred by a Gaussian of deviation s: from edge to
+ * edge at P/4 + k P/2 it rises and falls by 1 + erf((x - edge) / (s sqrt 2)). */
 static double wave(double x, double period, double s) {
-  double sum = 0;
-  for (int n = 1; n < 400; n += 2) {
-    double fade = exp(-2 * pow(M_PI * n * s / period, 2));
-    if (fade < 1e-6) {
-      break;
-    }
-    double sign = n % 4 == 1 ? 1 : -1;
-    sum -= sign * 4 / (M_PI * n) * cos(2 * M_PI * n * x / period) * fade;
+  long first = (long)ceil(2 * (x - REACH * s) / period - 0.5), last = (long)floor(2 * (x + REACH * s) / period - 0.5);
+  double sum = first % 2 == 0 ? -1 : 1;
+  for (long k = first; k <= last; k++) {
+    double edge = 0.5 * period * ((double)k + 0.5);
+    sum += (k % 2 == 0 ? 1 : -1) * (1 + erf((x - edge) / (s * M_SQRT2)));
   }
   return sum;
 }
 
 static float *fill_bit(clt_blur *blur, int bit, float *at) {
   double period = 4 << bit, squares = 0;
-  int steps = period_of(bit);
+  int entries = blur->steps << (bit + 2);
   blur->profile[bit] = at;
-  for (int k = 0; k < steps; k++) {
-    double x = (k + 0.5) / CLT_BLUR_STEPS, value = fmin(fmax(wave(x, period, blur->width), -1), 1);
+  for (int k = 0; k < entries; k++) {
+    double x = (k + 0.5) / blur->steps, value = fmin(fmax(wave(x, period, blur->width), -1), 1);
     at[k] = (float)value;
     squares += value * value;
     blur->peak[bit] = fmaxf(blur->peak[bit], at[k]);
   }
-  blur->rms[bit] = sqrt(squares / steps);
-  return at + steps;
+  blur->rms[bit] = sqrt(squares / entries);
+  return at + entries;
 }
 
 clt_status clt_blurs_init(clt_blurs *blurs, clt_error *error) {
   size_t entries = 0;
-  for (int bit = 0; bit < CLT_BLUR_BITS; bit++) {
-    entries += (size_t)period_of(bit);
+  for (int w = 0; w < CLT_BLUR_WIDTHS; w++) {
+    entries += (size_t)steps_of(width_of(w)) * (4 << CLT_BLUR_BITS);
   }
-  *blurs = (clt_blurs){.memory = clt_alloc(entries * CLT_BLUR_WIDTHS, sizeof(float))};
+  *blurs = (clt_blurs){.memory = clt_alloc(entries, sizeof(float))};
   if (blurs->memory == NULL) {
     return clt_fail(error, CLT_FAILED, "out of memory for the profiles of blurred stripes");
   }
   float *at = blurs->memory;
   for (int w = 0; w < CLT_BLUR_WIDTHS; w++) {
-    blurs->blur[w].width = NARROWEST * pow(WIDEST / NARROWEST, w / (CLT_BLUR_WIDTHS - 1.0));
+    blurs->blur[w].width = width_of(w);
+    blurs->blur[w].steps = steps_of(width_of(w));
     for (int bit = 0; bit < CLT_BLUR_BITS; bit++) {
       at = fill_bit(&blurs->blur[w], bit, at);
     }
@@ -65,18 +76,26 @@ void clt_blurs_finish(clt_blurs *blurs) {
   *blurs = (clt_blurs){0};
 }
 
-const clt_blur *clt_blurs_fit(const clt_blurs *blurs, const double mean_square[CLT_BLUR_BITS]) {
+/* gain = sum(seen rms) / sum(rms^2) has the least misfit. */
+const clt_blur *clt_blurs_fit(const clt_blurs *blurs, const double *mean_square, int bits, double *gain) {
   const clt_blur *best = &blurs->blur[0];
   double least = INFINITY;
   for (int w = 0; w < CLT_BLUR_WIDTHS; w++) {
-    double misfit = 0;
-    for (int bit = 0; bit < CLT_BLUR_BITS; bit++) {
-      double seen = sqrt(fmax(mean_square[bit], 0));
-      misfit += pow(seen - blurs->blur[w].rms[bit], 2);
+    const clt_blur *blur = &blurs->blur[w];
+    double product = 0, square = 0, misfit = 0;
+    for (int bit = 0; bit < bits; bit++) {
+      double weight = pow(0.25, bit);
+      product += weight * sqrt(fmax(mean_square[bit], 0)) * blur->rms[bit];
+      square += weight * blur->rms[bit] * blur->rms[bit];
+    }
+    double scale = fmin(fmax(product / square, LEAST_GAIN), 1);
+    for (int bit = 0; bit < bits; bit++) {
+      misfit += pow(0.25, bit) * pow(sqrt(fmax(mean_square[bit], 0)) - scale * blur->rms[bit], 2);
     }
     if (misfit < least) {
       least = misfit;
-      best = &blurs->blur[w];
+      best = blur;
+      *gain = scale;
     }
   }
   return best;

@@ -6,15 +6,16 @@
 #include "counterlight/status.h"
 
 enum {
-  CLT_BLUR_WIDTHS = 24, /* standard deviations that are told apart */
-  CLT_BLUR_BITS = 6,    /* bits with a table; stripes of higher ones are single edges */
-  CLT_BLUR_STEPS = 4    /* table entries a panel pixel */
+  CLT_BLUR_WIDTHS = 34,   /* standard deviations that are told apart */
+  CLT_BLUR_BITS = 6,      /* bits with a table; stripes of higher ones are single edges */
+  CLT_BLUR_STEPS_MAX = 64 /* table entries a panel pixel */
 };
 
-/* Tables of one width: profile[bit][k] is picture less inverse, -1..1, at panel coordinate (k + 1/2) / CLT_BLUR_STEPS,
- * periodic over 2^(bit + 2) pixels. */
+/* Tables of one width: profile[bit][k] is picture less inverse, -1..1, at panel coordinate (k + 1/2) / steps, periodic
+ * over 2^(bit + 2) pixels. */
 typedef struct clt_blur {
   double width;              /* standard deviation, panel pixels */
+  int steps;                 /* entries a panel pixel, a power of 2: at least two a width, and four */
   double rms[CLT_BLUR_BITS]; /* of each profile */
   float peak[CLT_BLUR_BITS]; /* largest value */
   const float *profile[CLT_BLUR_BITS];
@@ -27,8 +28,10 @@ typedef struct clt_blurs {
 
 clt_status clt_blurs_init(clt_blurs *blurs, clt_error *error);
 void clt_blurs_finish(clt_blurs *blurs); /* accepts a zeroed one */
-/* The width whose profiles have these mean squares, mean_square[bit] of differences over amplitudes. */
-const clt_blur *clt_blurs_fit(const clt_blurs *blurs, const double mean_square[CLT_BLUR_BITS]);
+/* The width whose profiles have these mean squares, mean_square[bit < bits] of differences over amplitudes, up to a
+ * *gain: the share of the amplitude that fine stripes have, light from other surfaces that see wide ones being in it.
+ */
+const clt_blur *clt_blurs_fit(const clt_blurs *blurs, const double *mean_square, int bits, double *gain);
 /* Picture less inverse at coordinate x of a single edge at `edge` from dark to lit. */
 float clt_blur_edge(const clt_blur *blur, float x, float edge);
 

@@ -10,7 +10,7 @@
 #include "rig/geometry/blur.h"
 #include "rig/geometry/refine.h"
 
-enum { TILE = 64, FEW_LIT = 64, COARSEST = 4, HYPOTHESES_MAX = 3 * CLT_BLUR_STEPS << COARSEST };
+enum { TILE = 64, FEW_LIT = 64, COARSEST = 4, HYPOTHESES_MAX = 3 * CLT_BLUR_STEPS_MAX << COARSEST };
 #define LIT 6.0          /* amplitude over noise from which a pixel is decoded */
 #define LEAST_LIGHT 0.03 /* of full scale: below it a longer exposure tells more */
 #define SURE 3.0         /* difference over noise from which its sign counts */
@@ -20,6 +20,9 @@ enum { TILE = 64, FEW_LIT = 64, COARSEST = 4, HYPOTHESES_MAX = 3 * CLT_BLUR_STEP
 #define TRUST_FINE 0.07F
 #define TRUST_WIDER 0.2F
 #define TRUST_EDGE 0.2F
+#define TRUST_AMPLITUDE 0.3F
+/* Share of the amplitude that fine stripes must have; light by way of a wall beside an inner corner has less. */
+#define DIRECT 0.75F
 #define MISFIT 25.0 /* mean squared deviation from the profiles, in variances, at which they are no explanation */
 #define VAGUE 1.5   /* panel pixels of deviation at which a coordinate is of no use */
 
@@ -122,31 +125,56 @@ static clt_pixel_fate check_bits(const reading *r, const clt_blur *blur, int fin
   return fate;
 }
 
-/* Adds a bit's squared deviations, in variances, to the cost of each hypothesis; hypothesis h stands at
- * (from + h + 1/2) / CLT_BLUR_STEPS. */
-static void add_bit(const reading *r, const clt_blur *blur, int bit, float trust, int from, int count, float *cost) {
-  float precision = 1 / (r->noise * r->noise + trust * trust * r->amplitude * r->amplitude);
-  int mask = (CLT_BLUR_STEPS << (bit + 2)) - 1;
-  const float *profile = blur->profile[bit];
-  for (int h = 0; h < count; h++) {
-    float off = r->difference[bit] - r->amplitude * profile[(from + h) & mask];
-    cost[h] += precision * off * off;
+/* Products of a pixel's differences with the profiles of each hypothesis, h standing at (from + h + 1/2) / blur->steps:
+ * sums of p d^2, p d E and p E^2 over the bits, p the precision of d. */
+typedef struct trial {
+  int from, count;
+  float squares, product[HYPOTHESES_MAX], profile[HYPOTHESES_MAX];
+} trial;
+
+static float precision_of(const reading *r, float trust) {
+  return 1 / (r->noise * r->noise + trust * trust * r->amplitude * r->amplitude);
+}
+
+static void add_value(trial *t, int h, float precision, float difference, float profile) {
+  t->product[h] += precision * difference * profile;
+  t->profile[h] += precision * profile * profile;
+}
+
+static void add_bit(const reading *r, const clt_blur *blur, int bit, float trust, trial *t) {
+  float precision = precision_of(r, trust);
+  int mask = (blur->steps << (bit + 2)) - 1;
+  t->squares += precision * r->difference[bit] * r->difference[bit];
+  for (int h = 0; h < t->count; h++) {
+    add_value(t, h, precision, r->difference[bit], blur->profile[bit][(t->from + h) & mask]);
   }
 }
 
-static void add_edge(const reading *r, const clt_blur *blur, int bit, int edge, float trust, int from, int count,
-                     float *cost) {
-  float precision = 1 / (r->noise * r->noise + trust * trust * r->amplitude * r->amplitude);
-  float sign = clt_gray_lit(edge, bit) ? r->amplitude : -r->amplitude;
-  for (int h = 0; h < count; h++) {
-    float x = ((float)(from + h) + 0.5F) / CLT_BLUR_STEPS;
-    float off = r->difference[bit] - sign * clt_blur_edge(blur, x, (float)edge);
-    cost[h] += precision * off * off;
+static void add_edge(const reading *r, const clt_blur *blur, int bit, int edge, float trust, trial *t) {
+  float precision = precision_of(r, trust), sign = clt_gray_lit(edge, bit) ? 1.0F : -1.0F;
+  t->squares += precision * r->difference[bit] * r->difference[bit];
+  for (int h = 0; h < t->count; h++) {
+    float x = ((float)(t->from + h) + 0.5F) / (float)blur->steps;
+    add_value(t, h, precision, r->difference[bit], sign * clt_blur_edge(blur, x, (float)edge));
   }
+}
+
+/* Squared deviations of each hypothesis, in variances, at the amplitude a that suits it best, which is known to
+ * TRUST_AMPLITUDE beforehand: the least of sum p (d - a E)^2 + q (a - a0)^2. Returns a of the cheapest. */
+static float weigh(const reading *r, const trial *t, float *cost) {
+  float q = 1 / (TRUST_AMPLITUDE * TRUST_AMPLITUDE * r->amplitude * r->amplitude), a0 = r->amplitude;
+  float least = INFINITY, amplitude = a0;
+  for (int h = 0; h < t->count; h++) {
+    float product = t->product[h] + q * a0, fitted = product / (t->profile[h] + q);
+    cost[h] = t->squares + q * a0 * a0 - product * fitted;
+    amplitude = cost[h] < least ? fitted : amplitude;
+    least = fminf(least, cost[h]);
+  }
+  return amplitude;
 }
 
 /* Mean and variance of the coordinate under weights exp(-cost / 2); returns the least cost. */
-static float mean_hypothesis(const float *cost, int from, int count, finding *out) {
+static float mean_hypothesis(const float *cost, int from, int count, int steps, finding *out) {
   float least = INFINITY;
   for (int h = 0; h < count; h++) {
     least = fminf(least, cost[h]);
@@ -162,25 +190,36 @@ static float mean_hypothesis(const float *cost, int from, int count, finding *ou
     }
   }
   float mean = s1 / s0;
-  out->x = ((float)from + mean) / CLT_BLUR_STEPS;
-  out->variance = (fmaxf(s2 / s0 - mean * mean, 0) + 1 / 12.0F) / (CLT_BLUR_STEPS * CLT_BLUR_STEPS);
+  out->x = ((float)from + mean) / (float)steps;
+  out->variance = (fmaxf(s2 / s0 - mean * mean, 0) + 1 / 12.0F) / (float)(steps * steps);
   return least;
 }
 
 /* Step 4. */
-static void locate(const reading *r, const clt_blur *blur, int finest, int cell, finding *out) {
-  int size = CLT_BLUR_STEPS << finest, from = (cell - 1) * size, count = 3 * size, terms = 0;
-  float cost[HYPOTHESES_MAX] = {0};
+static void locate(const reading *r, const clt_blur *blur, int finest, int cell, int panel, finding *out) {
+  int size = blur->steps << finest, border = blur->steps / 2, terms = 0;
+  int from = (int)fmax((cell - 1) * size, -border), to = (int)fmin((cell + 2) * size, panel * blur->steps + border);
+  int count = to - from;
+  if (count < 1) {
+    out->fate = CLT_PIXEL_OUTSIDE;
+    return;
+  }
+  trial t; /* too large to be cleared as a whole at every pixel */
+  t.from = from, t.count = count, t.squares = 0;
+  memset(t.product, 0, (size_t)count * sizeof *t.product);
+  memset(t.profile, 0, (size_t)count * sizeof *t.profile);
+  float cost[HYPOTHESES_MAX];
   for (int b = 0; b <= finest + 1 && b < CLT_BLUR_BITS && b < r->bits; b++, terms++) {
-    add_bit(r, blur, b, b <= finest ? TRUST_FINE : TRUST_WIDER, from, count, cost);
+    add_bit(r, blur, b, b <= finest ? TRUST_FINE : TRUST_WIDER, &t);
   }
   int edge = rare_edge(cell), bit = edge > 0 ? finest + zeros_of(edge) : r->bits;
   if (bit < r->bits) {
-    add_edge(r, blur, bit, edge << finest, TRUST_EDGE, from, count, cost);
+    add_edge(r, blur, bit, edge << finest, TRUST_EDGE, &t);
     terms++;
   }
-  float least = mean_hypothesis(cost, from, count, out);
-  if (least > (float)MISFIT * (float)terms) {
+  float amplitude = weigh(r, &t, cost);
+  float least = mean_hypothesis(cost, from, count, blur->steps, out);
+  if (least > (float)MISFIT * (float)terms || amplitude < DIRECT * r->amplitude) {
     out->fate = CLT_PIXEL_DOUBLE;
   } else if (out->variance > VAGUE * VAGUE) {
     out->fate = CLT_PIXEL_AMBIGUOUS;
@@ -197,7 +236,7 @@ static finding decode_axis(const decoder *d, const reading *r, const clt_blur *b
   int cell = decode_cell(r, finest);
   out.fate = check_bits(r, blur, finest, cell, &out.bit);
   if (out.fate == CLT_PIXEL_DECODED) {
-    locate(r, blur, finest, cell, &out);
+    locate(r, blur, finest, cell, size, &out);
   }
   if (out.fate == CLT_PIXEL_DECODED && !(out.x > -1 && out.x < (float)size + 1)) {
     out.fate = CLT_PIXEL_OUTSIDE;
@@ -205,7 +244,7 @@ static finding decode_axis(const decoder *d, const reading *r, const clt_blur *b
   return out;
 }
 
-static void decode_pixel(const decoder *d, size_t pixel, const clt_blur *const blur[2]) {
+static void decode_pixel(const decoder *d, size_t pixel, const clt_blur *const blur[2], const double gain[2]) {
   clt_pixel_map *map = d->map;
   finding found[2];
   for (int axis = 0; axis < 2; axis++) {
@@ -213,6 +252,7 @@ static void decode_pixel(const decoder *d, size_t pixel, const clt_blur *const b
     if (!is_lit(&r)) {
       return; /* stays unlit */
     }
+    r.amplitude *= (float)gain[axis];
     found[axis] = decode_axis(d, &r, blur[axis], axis);
   }
   for (int axis = 0; axis < 2; axis++) {
@@ -234,7 +274,7 @@ typedef struct rectangle {
 } rectangle;
 
 /* Blur of an axis by the pixels of a rectangle; NULL where too few are lit. */
-static const clt_blur *measure_blur(const decoder *d, const rectangle *at, int axis) {
+static const clt_blur *measure_blur(const decoder *d, const rectangle *at, int axis, double *gain) {
   double squares[CLT_BLUR_BITS] = {0}, amplitudes = 0;
   long lit = 0;
   for (int y = at->top; y < at->bottom; y++) {
@@ -250,15 +290,17 @@ static const clt_blur *measure_blur(const decoder *d, const rectangle *at, int a
       lit++;
     }
   }
-  for (int b = 0; b < CLT_BLUR_BITS; b++) {
-    squares[b] = b < d->pairs->gray.bits[axis] ? squares[b] / fmax(amplitudes, 1) : 1;
+  int bits = d->pairs->gray.bits[axis] < CLT_BLUR_BITS ? d->pairs->gray.bits[axis] : CLT_BLUR_BITS;
+  for (int b = 0; b < bits; b++) {
+    squares[b] /= fmax(amplitudes, 1);
   }
-  return lit >= FEW_LIT ? clt_blurs_fit(&d->blurs, squares) : NULL;
+  return lit >= FEW_LIT ? clt_blurs_fit(&d->blurs, squares, bits, gain) : NULL;
 }
 
 static void decode_tile(const decoder *d, const rectangle *at, const clt_blur *blur[2]) {
+  double gain[2];
   for (int axis = 0; axis < 2; axis++) {
-    blur[axis] = measure_blur(d, at, axis);
+    blur[axis] = measure_blur(d, at, axis, &gain[axis]);
   }
   if (blur[0] == NULL || blur[1] == NULL) {
     return;
@@ -269,7 +311,7 @@ static void decode_tile(const decoder *d, const rectangle *at, const clt_blur *b
       if (d->pairs->saturated[pixel]) {
         d->map->fate[pixel] = CLT_PIXEL_SATURATED;
       } else {
-        decode_pixel(d, pixel, blur);
+        decode_pixel(d, pixel, blur, gain);
       }
     }
   }

@@ -8,9 +8,10 @@
  *   3. Bits that blur leaves above the noise are taken by sign. Where the pixel is not at an edge of theirs they must
  *      have their full height: one near zero is ambiguous, one far below it is lit from two places (Xu & Aliaga,
  * "Robust pixel classification for 3D modeling with structured light", GI 2007, for the notion).
- *   4. x is the mean over the likelihood of all fine differences in the code's cell and its neighbours, which comes to
- *      the cell's middle where stripes are sharp and to interpolated zero crossings where they are soft.
- * Then refine.h puts pixels in line with their neighbours. */
+ *   4. x is the mean over the likelihood of all fine differences in the code's cell and its neighbours, as far as the
+ *      panel reaches, A being what suits each place best: light of wide stripes by way of other surfaces is in the A of
+ *      step 1. That comes to the cell's middle where stripes are sharp and to interpolated zero crossings where they
+ * are soft. Then refine.h puts pixels in line with their neighbours. */
 #ifndef CLT_RIG_GEOMETRY_DECODE_H
 #define CLT_RIG_GEOMETRY_DECODE_H
 

@@ -87,7 +87,17 @@ static clt_status fit(const points *p, double f[9], clt_error *error) {
   return status;
 }
 
-static clt_status measure(points *p, const clt_stereo *reference, clt_error *error) {
+/* The pixels that a lens of the same focal length and centre, but straight, would see. */
+static clt_status straighten(points *p, const clt_lens *lens, clt_error *error) {
+  clt_status status = clt_lens_undistort(lens, p->camera, p->count, error);
+  for (size_t i = 0; i < p->count; i++) {
+    p->camera[2 * i] = lens->fx * p->camera[2 * i] + lens->cx;
+    p->camera[2 * i + 1] = lens->fy * p->camera[2 * i + 1] + lens->cy;
+  }
+  return status;
+}
+
+static clt_status measure(points *p, const clt_stereo *reference, const clt_lens *lens, clt_error *error) {
   double e[9], fx = 1, fy = 1;
   clt_status status;
   if (reference != NULL) {
@@ -99,7 +109,8 @@ static clt_status measure(points *p, const clt_stereo *reference, clt_error *err
       status = clt_lens_undistort(&reference->projector, p->panel, p->count, error);
     }
   } else {
-    status = fit(p, e, error);
+    status = lens != NULL ? straighten(p, lens, error) : CLT_OK;
+    status = status == CLT_OK ? fit(p, e, error) : status;
   }
   for (size_t i = 0; status == CLT_OK && i < p->count; i++) {
     p->distance[i] = distance_of(e, p->camera + 2 * i, p->panel + 2 * i, fx, fy);
@@ -121,13 +132,13 @@ static long summarise(points *p, float least, double *median, double *upper) {
   return (long)count;
 }
 
-clt_status clt_epipolar_check(const clt_pixel_map *map, const clt_stereo *reference, clt_epipolar *out,
-                              clt_error *error) {
+clt_status clt_epipolar_check(const clt_pixel_map *map, const clt_stereo *reference, const clt_lens *lens,
+                              clt_epipolar *out, clt_error *error) {
   points p;
   *out = (clt_epipolar){.fitted = reference == NULL}; /* count stays 0 on failure */
   clt_status status = take_points(map, &p, error);
   if (status == CLT_OK) {
-    status = measure(&p, reference, error);
+    status = measure(&p, reference, lens, error);
   }
   if (status == CLT_OK) {
     out->count = summarise(&p, 0, &out->median, &out->upper);

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/memory.h"
 
@@ -11,20 +12,23 @@ enum {
   RADIUS_MAX = 20,
   WINDOW_MAX = (2 * RADIUS_MAX + 1) * (2 * RADIUS_MAX + 1),
   LAG = 4,
-  PASSES = 2
+  PASSES = 2,
+  TERMS = 6
 };
 enum { BINS = 4096, BINS_PER_PIXEL = 64 }; /* of the histogram of pitches, panel pixels */
 #define STEEP 3.0                          /* times the usual pitch that a surface may have */
 #define SLACK 1.0                          /* panel pixels that stripes are always uncertain to */
 #define SIGMAS 3.0
-#define SUPPORT 0.2 /* of the window */
-#define REACH 2.5   /* panel pixels that a window reaches to each side */
-#define FINE 0.34   /* pitch below which a panel pixel spans so many camera pixels that only its edges tell places */
+#define SUPPORT 0.2  /* of the window */
+#define REACH 2.5    /* panel pixels that a window reaches to each side */
+#define TROUBLED 1.5 /* excess from which a window is taken to hold two surfaces */
+#define BETTER 0.5   /* of the risk that a window beside the pixel must have */
+#define FINE 0.34    /* pitch below which a panel pixel spans so many camera pixels that only its edges tell places */
 
 /* What a pixel's window is made of, relative to the pixel. */
 typedef struct window {
   int count;
-  float u[WINDOW_MAX], v[WINDOW_MAX], x[WINDOW_MAX], y[WINDOW_MAX], weight[WINDOW_MAX];
+  float u[WINDOW_MAX], v[WINDOW_MAX], at[2][WINDOW_MAX], weight[2][WINDOW_MAX]; /* x and y, 1 / variance */
 } window;
 
 typedef struct refiner {
@@ -36,11 +40,22 @@ typedef struct refiner {
   float reach[2 * RADIUS_MAX + 1][2 * RADIUS_MAX + 1];
 } refiner;
 
-/* The plane's value at the pixel, and its variance (both axes together). */
-typedef struct plane {
-  double x, y, variance;
+/* A coordinate as a polynomial of the place in a window, relative to its middle: 1, u, v, and of wide windows u^2, uv,
+ * v^2. */
+typedef struct surface {
+  int terms;
+  double at[TERMS];
+  double factor[TERMS][TERMS]; /* L of M = L L', M the weighted moments of the terms */
+  double excess;               /* mean of (squared distance from the surface / variance) */
+  double spread;               /* mean variance of what it rests on */
+} surface;
+
+/* Values of x and y at a pixel, relative to the pixel's own, their variances together, and the squared error to be
+ * expected of them. */
+typedef struct value {
+  double at[2], variance, risk;
   bool found;
-} plane;
+} value;
 
 /* Median pitch by a histogram over pairs of decoded pixels LAG apart in a row and in a column. */
 static double measure_pitch(const clt_pixel_map *map) {
@@ -88,84 +103,180 @@ static void gather(const refiner *r, int px, int py, window *out) {
       float reach = slack + r->reach[v + RADIUS_MAX][u + RADIUS_MAX];
       if (dx * dx + dy * dy <= reach * reach) {
         int k = out->count++;
-        out->u[k] = (float)u, out->v[k] = (float)v, out->x[k] = dx, out->y[k] = dy, out->weight[k] = 1 / own;
+        out->u[k] = (float)u, out->v[k] = (float)v, out->at[0][k] = dx, out->at[1][k] = dy;
+        out->weight[0][k] = 1 / r->variance[n], out->weight[1][k] = 1 / r->variance[r->pixels + n];
       }
     }
   }
 }
 
-/* Weighted least squares of x = a + b u + c v and of y: M [a b c] = m with M the moments of 1, u, v. */
-static plane fit_plane(const window *w, float slope[2][2]) {
-  double s = 0, su = 0, sv = 0, suu = 0, suv = 0, svv = 0, m[2][3] = {{0}};
+static void terms_at(double u, double v, double t[TERMS]) {
+  t[0] = 1, t[1] = u, t[2] = v, t[3] = u * u, t[4] = u * v, t[5] = v * v;
+}
+
+/* Cholesky's factor in place, lower half; false where M is singular. */
+static bool factorise(double m[TERMS][TERMS], int n) {
+  for (int i = 0; i < n; i++) {
+    for (int j = 0; j <= i; j++) {
+      double sum = m[i][j];
+      for (int k = 0; k < j; k++) {
+        sum -= m[i][k] * m[j][k];
+      }
+      if (i == j && !(sum > 1e-9 * m[0][0])) {
+        return false;
+      }
+      m[i][j] = i == j ? sqrt(sum) : sum / m[j][j];
+    }
+  }
+  return true;
+}
+
+/* L z = b in place; b' M^-1 b is then |z|^2. */
+static void solve_lower(double l[TERMS][TERMS], int n, double *b) {
+  for (int i = 0; i < n; i++) {
+    for (int k = 0; k < i; k++) {
+      b[i] -= l[i][k] * b[k];
+    }
+    b[i] /= l[i][i];
+  }
+}
+
+static void solve_upper(double l[TERMS][TERMS], int n, double *b) {
+  for (int i = n - 1; i >= 0; i--) {
+    for (int k = i + 1; k < n; k++) {
+      b[i] -= l[k][i] * b[k];
+    }
+    b[i] /= l[i][i];
+  }
+}
+
+/* Weighted least squares. */
+static bool fit_surface(const window *w, int axis, surface *s) {
+  int n = s->terms;
+  double t[TERMS];
+  memset(s->factor, 0, sizeof s->factor);
+  memset(s->at, 0, sizeof s->at);
   for (int k = 0; k < w->count; k++) {
-    double q = w->weight[k], u = w->u[k], v = w->v[k], x = w->x[k], y = w->y[k];
-    s += q, su += q * u, sv += q * v, suu += q * u * u, suv += q * u * v, svv += q * v * v;
-    m[0][0] += q * x, m[0][1] += q * u * x, m[0][2] += q * v * x;
-    m[1][0] += q * y, m[1][1] += q * u * y, m[1][2] += q * v * y;
+    double q = w->weight[axis][k];
+    terms_at(w->u[k], w->v[k], t);
+    for (int i = 0; i < n; i++) {
+      for (int j = 0; j <= i; j++) {
+        s->factor[i][j] += q * t[i] * t[j];
+      }
+      s->at[i] += q * t[i] * w->at[axis][k];
+    }
   }
-  double c0 = suu * svv - suv * suv, c1 = suv * sv - su * svv, c2 = su * suv - suu * sv;
-  double determinant = s * c0 + su * c1 + sv * c2;
-  if (!(determinant > 1e-9 * s * s * s)) {
-    return (plane){.found = false};
+  s->spread = w->count / s->factor[0][0];
+  if (!factorise(s->factor, n)) {
+    return false;
   }
-  double value[2];
-  for (int a = 0; a < 2; a++) { /* rows of the symmetric inverse of M */
-    value[a] = (c0 * m[a][0] + c1 * m[a][1] + c2 * m[a][2]) / determinant;
-    slope[a][0] = (float)((c1 * m[a][0] + (s * svv - sv * sv) * m[a][1] + (su * sv - s * suv) * m[a][2]) / determinant);
-    slope[a][1] = (float)((c2 * m[a][0] + (su * sv - s * suv) * m[a][1] + (s * suu - su * su) * m[a][2]) / determinant);
-  }
-  return (plane){value[0], value[1], c0 / determinant, true};
+  solve_lower(s->factor, n, s->at);
+  solve_upper(s->factor, n, s->at);
+  return true;
 }
 
-/* Squared distance of a window's pixel from the plane. */
-static float off_plane(const window *w, int k, const plane *fit, float slope[2][2]) {
-  float x = w->x[k] - (float)fit->x - slope[0][0] * w->u[k] - slope[0][1] * w->v[k];
-  float y = w->y[k] - (float)fit->y - slope[1][0] * w->u[k] - slope[1][1] * w->v[k];
-  return x * x + y * y;
+static double sum_terms(const double *c, const double *t, int n) {
+  double sum = 0;
+  for (int k = 0; k < n; k++) {
+    sum += c[k] * t[k];
+  }
+  return sum;
 }
 
-/* Drops what lies off the plane; returns the mean of (squared distance / variance) of all that was there. */
-static double drop_outliers(window *w, const plane *fit, float slope[2][2]) {
-  double squares = 0;
-  float distance[WINDOW_MAX];
+/* Drops what lies off the surfaces; measures the excess of all that was there. */
+static void drop_outliers(window *w, surface s[2]) {
+  float off[2][WINDOW_MAX], limit[2];
   int kept = 0;
-  for (int k = 0; k < w->count; k++) {
-    distance[k] = off_plane(w, k, fit, slope);
-    squares += distance[k] * w->weight[k];
+  for (int a = 0; a < 2; a++) {
+    double squares = 0, t[TERMS];
+    for (int k = 0; k < w->count; k++) {
+      terms_at(w->u[k], w->v[k], t);
+      off[a][k] = (float)pow(w->at[a][k] - sum_terms(s[a].at, t, s[a].terms), 2);
+      squares += off[a][k] * w->weight[a][k];
+    }
+    s[a].excess = squares / w->count;
+    limit[a] = (float)(SIGMAS * SIGMAS * fmin(s[a].excess, 1) + 1e-12);
   }
-  double excess = squares / w->count;
-  float limit = (float)(SIGMAS * SIGMAS * fmin(excess, 1) + 1e-12);
   for (int k = 0; k < w->count; k++) {
-    if (distance[k] * w->weight[k] <= limit || distance[k] < 0.0625F) { /* a quarter of a pixel is always near */
-      w->u[kept] = w->u[k], w->v[kept] = w->v[k], w->x[kept] = w->x[k], w->y[kept] = w->y[k];
-      w->weight[kept++] = w->weight[k];
+    bool on = off[0][k] * w->weight[0][k] <= limit[0] && off[1][k] * w->weight[1][k] <= limit[1];
+    if (on || off[0][k] + off[1][k] < 0.0625F) { /* a quarter of a pixel is always near */
+      w->u[kept] = w->u[k], w->v[kept] = w->v[k];
+      for (int a = 0; a < 2; a++) {
+        w->at[a][kept] = w->at[a][k], w->weight[a][kept] = w->weight[a][k];
+      }
+      kept++;
     }
   }
   w->count = kept;
-  return excess;
 }
 
-static plane refine_pixel(const refiner *r, int x, int y) {
+/* The surfaces of x and y through the window around a pixel. */
+static bool find_surfaces(const refiner *r, int x, int y, surface s[2]) {
   window w;
   int side = 2 * r->radius + 1, fewest = (int)fmax(4, SUPPORT * side * side);
   gather(r, x, y, &w);
-  plane fit = {.found = false};
+  s[0].terms = s[1].terms = r->radius > RADIUS_USUAL ? TERMS : 3;
   for (int pass = 0; pass < PASSES; pass++) {
-    float slope[2][2];
-    if (w.count < fewest) {
-      return (plane){.found = false};
+    if (w.count < fewest || !fit_surface(&w, 0, &s[0]) || !fit_surface(&w, 1, &s[1])) {
+      return false;
     }
-    fit = fit_plane(&w, slope);
-    if (!fit.found) {
-      return fit;
-    }
-    double excess = drop_outliers(&w, &fit, slope);
-    fit.variance *= fmax(excess, 1);
+    drop_outliers(&w, s);
   }
+  return true;
+}
+
+/* Their values at (u, v) from the window's middle, whose own coordinates are x and y from the pixel's. */
+static value value_of(surface s[2], double u, double v, double x, double y) {
+  value out = {.at = {x, y}, .found = true};
+  for (int a = 0; a < 2; a++) {
+    double t[TERMS];
+    terms_at(u, v, t);
+    out.at[a] += sum_terms(s[a].at, t, s[a].terms);
+    solve_lower(s[a].factor, s[a].terms, t);
+    out.variance += sum_terms(t, t, s[a].terms) * fmax(s[a].excess, 1);
+    out.risk += fmax(s[a].excess - 1, 0) * s[a].spread;
+  }
+  out.risk += out.variance;
+  return out;
+}
+
+/* The least risky surface of the windows that have the pixel at their edge; at edges in depth and creases the pixel's
+ * own window holds two surfaces, and one beside it a single one. limit: distance from the pixel's own coordinates. */
+static void look_beside(const refiner *r, int x, int y, double limit, value *best) {
+  static const int around[8][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {-1, 1}, {1, -1}, {-1, -1}};
+  const clt_pixel_map *map = r->map;
+  size_t p = (size_t)y * (size_t)map->width + (size_t)x;
+  for (int k = 0; k < 8; k++) {
+    surface s[2];
+    int u = around[k][0] * r->radius, v = around[k][1] * r->radius, qx = x + u, qy = y + v;
+    size_t q = (size_t)qy * (size_t)map->width + (size_t)qx;
+    if (qx < 0 || qy < 0 || qx >= map->width || qy >= map->height || map->fate[q] != CLT_PIXEL_DECODED ||
+        !find_surfaces(r, qx, qy, s)) {
+      continue;
+    }
+    double dx = (double)map->x[q] - (double)map->x[p], dy = (double)map->y[q] - (double)map->y[p];
+    value there = value_of(s, -u, -v, dx, dy);
+    if (there.risk < best->risk && hypot(there.at[0], there.at[1]) <= limit) {
+      *best = there;
+    }
+  }
+}
+
+static value refine_pixel(const refiner *r, int x, int y) {
   size_t p = (size_t)y * (size_t)r->map->width + (size_t)x;
-  double own = (double)r->variance[p] + (double)r->variance[r->pixels + p];
-  fit.found = hypot(fit.x, fit.y) <= SLACK + SIGMAS * sqrt(own);
-  return fit;
+  double own = (double)r->variance[p] + (double)r->variance[r->pixels + p], limit = SLACK + SIGMAS * sqrt(own);
+  surface s[2];
+  value best = {.found = false};
+  if (!find_surfaces(r, x, y, s)) {
+    return best;
+  }
+  best = value_of(s, 0, 0, 0, 0);
+  best.risk *= BETTER;
+  if (fmax(s[0].excess, s[1].excess) >= TROUBLED) {
+    look_beside(r, x, y, limit, &best);
+  }
+  best.found = hypot(best.at[0], best.at[1]) <= limit;
+  return best;
 }
 
 static void refine_row(const refiner *r, int y, clt_pixel_map *out) {
@@ -176,14 +287,14 @@ static void refine_row(const refiner *r, int y, clt_pixel_map *out) {
       clt_pixel_map_mask(out, i, map->fate[i]);
       continue;
     }
-    plane fit = refine_pixel(r, x, y);
+    value fit = refine_pixel(r, x, y);
     if (!fit.found) {
       clt_pixel_map_mask(out, i, CLT_PIXEL_ISOLATED);
       continue;
     }
     out->fate[i] = CLT_PIXEL_DECODED;
-    out->x[i] = map->x[i] + (float)fit.x;
-    out->y[i] = map->y[i] + (float)fit.y;
+    out->x[i] = map->x[i] + (float)fit.at[0];
+    out->y[i] = map->y[i] + (float)fit.at[1];
     out->confidence[i] = clt_pixel_confidence(fit.variance);
     bool inside =
         out->x[i] >= 0 && out->x[i] < (float)map->panel_width && out->y[i] >= 0 && out->y[i] < (float)map->panel_height;
