@@ -31,17 +31,20 @@ typedef struct clt_acquire_options {
   int checks;         /* random check patterns observed at the end for provenance.error, 0..64 */
   unsigned seed;      /* of the check patterns */
   const char
-      *journal;      /* NULL, or a file in which every observation is kept as soon as it is made. Where it is there
-                        already, from an acquisition that was interrupted, its observations are taken instead of new
-                        ones as long as the same patterns are asked for. It stays: remove it when the transport is
-                        stored, or the next acquisition gives that one again. CLT_BAD_INPUT where it is another rig's */
-  int watch;         /* patterns between two looks at the white picture, 0..1000000: where it is not as it was, what was
-                        observed since the last look is observed again once it is; all cells of a channel brighter or darker by
-                        one factor are a lamp, by which observations are divided. A look follows at once where exposures of one
-                        pattern contradict each other. Also waits for a device that is gone or gives no frame. 0: looks never
-                        and waits for nothing; -1: every 25 patterns, where what that keeps in a temporary file is less than
-                        256 MiB */
-  double watch_s;    /* seconds of the devices' time after which a look is due as well; 0: patterns alone count */
+      *journal;   /* NULL, or a file in which every observation is kept as soon as it is made. Where it is there
+                     already, from an acquisition that was interrupted, its observations are taken instead of new
+                     ones as long as the same patterns are asked for. It stays: remove it when the transport is
+                     stored, or the next acquisition gives that one again. CLT_BAD_INPUT where it is another rig's */
+  int watch;      /* patterns between two looks, 0..1000000: at what the patterns since the last one show together, and
+                     at the white picture. Where the light of the patterns does not add up, or white is not as it was,
+                     they are observed again once it is; all cells of a channel brighter or darker by one factor are a
+                     lamp, by which observations are divided. A look follows at once where exposures of one pattern
+                     contradict each other. Also waits for a device that is gone or gives no frame. 0: looks never and
+                     waits for nothing; -1: every 25 patterns, and where what has to be kept in a temporary file to
+                     observe only those again is more than 256 MiB and there is no journal, a disturbance is an error.
+                     Patterns that never add up though their light is the same each time are a camera not in
+                     proportion to light: provenance.plan says so */
+  double watch_s; /* seconds of the devices' time after which a look is due as well; 0: patterns alone count */
   double patience_s; /* to wait for either, >= 0; 0 means 30. Then CLT_FAILED says where the room changed and by how
                         much, or the rig's own status says what is missing */
   bool recorded;     /* the devices are a recording: where it ends they are not waited for */

@@ -61,7 +61,8 @@ typedef struct clt_fit {
 } clt_fit;
 
 /* Compares the photograph `seen` of `drive` (black included, with its standard deviation; infinite: not seen) with b0 +
- * T drive. A picture without detail cannot tell that a projector has moved. CLT_BAD_INPUT where sizes differ, rows !=
+ * T drive, where the drive is what the panel showed, by clt_panel_shown: rounding to 8 bits alone changes light by some
+ * .2 %. A picture without detail cannot tell that a projector has moved. CLT_BAD_INPUT where sizes differ, rows !=
  * cols, or where no lit cell was seen. */
 CLT_PUBLIC clt_status clt_loop_check(const clt_transport *transport, const clt_certificate *certificate,
                                      const clt_image *drive, const clt_image *seen, const clt_image *deviation,

@@ -40,6 +40,10 @@ CLT_PUBLIC void clt_panel_encode(const clt_panel *panel, const clt_image *drive,
  * clt_panel_encode undoes. light is initialised here. */
 CLT_PUBLIC clt_status clt_panel_decode(const clt_panel *panel, const clt_image *codes, clt_image *light,
                                        clt_error *error);
+/* The light that a panel shows for a drive (as for clt_panel_encode, a panel of as many channels): of its codes,
+ * rounded to `bits` (1..16). shown is initialised here, of the drive's size. */
+CLT_PUBLIC clt_status clt_panel_shown(const clt_panel *panel, int bits, const clt_image *drive, clt_image *shown,
+                                      clt_error *error);
 /* Writes a drive: .png and .jpg hold the codes that show it (8 bit), .exr and .npy its linear light. As
  * clt_image_write. */
 CLT_PUBLIC clt_status clt_panel_write(const char *path, const clt_panel *panel, const clt_image *drive,

@@ -85,6 +85,11 @@ static void write_provenance(const clt_session *session, const clt_scheme *schem
                              .seconds = clt_clock_since(session->started_ns),
                              .error = error};
   snprintf(origin->plan, sizeof origin->plan, "%s", session->plan);
+  if (session->watch.unexplained > 0) {
+    const size_t used = strlen(origin->plan);
+    snprintf(origin->plan + used, sizeof origin->plan - used,
+             "; %ld patterns did not add up: check the camera's response", session->watch.unexplained);
+  }
   snprintf(origin->scheme, sizeof origin->scheme, "%s", scheme->name);
   snprintf(origin->source, sizeof origin->source, "%s", now.source != NULL ? now.source : "");
   snprintf(origin->response, sizeof origin->response, "%s", now.response != NULL ? now.response : "");
@@ -126,11 +131,11 @@ static clt_status measure(clt_session *session, const clt_scheme *scheme, clt_tr
   }
 }
 
-/* Every so many patterns, unless what would have to be kept for that is large: two values a cell and channel each. */
-static int watch_by_itself(const clt_session *session, const clt_scheme *scheme) {
+/* What would have to be kept to measure only what was disturbed again: two values a cell and channel and pattern. */
+static bool is_worth_keeping(const clt_session *session, const clt_scheme *scheme) {
   double patterns = 2.0 * session->options.repeats + (double)scheme->patterns(session);
   double bytes = 2.0 * sizeof(float) * (double)session->cells * session->info.channels * patterns;
-  return bytes <= WATCH_KEEPS_MOST ? WATCH_DEFAULT : 0;
+  return session->options.watch >= 0 || bytes <= WATCH_KEEPS_MOST;
 }
 
 static clt_status acquire(clt_session *session, const clt_scheme *scheme, clt_transport **out, clt_error *error) {
@@ -170,8 +175,9 @@ clt_status clt_acquire(clt_rig *rig, const clt_acquire_options *options, clt_tra
   }
   if (status == CLT_OK) {
     session.options.repeats = checked.repeats > 0 ? checked.repeats : scheme->repeats(session.cells);
-    session.options.watch = checked.watch < 0 ? watch_by_itself(&session, scheme) : checked.watch;
-    status = clt_session_begin_watch(&session, error);
+    bool kept = is_worth_keeping(&session, scheme);
+    session.options.watch = checked.watch < 0 ? WATCH_DEFAULT : checked.watch;
+    status = clt_session_begin_watch(&session, kept, error);
   }
   if (status == CLT_OK) {
     status = acquire(&session, scheme, out, error);

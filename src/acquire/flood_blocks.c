@@ -252,7 +252,7 @@ static void light_quarters(flood_blocks *own) {
 static clt_status test_quarters(flood_blocks *own, double *relative, clt_error *error) {
   clt_transport *transport = NULL;
   light_quarters(own);
-  clt_status status = clt_session_observe(own->session, "test", error);
+  clt_status status = clt_session_test(own->session, "test", error);
   if (status == CLT_OK) {
     status = make_transport(own, &transport, error);
   }

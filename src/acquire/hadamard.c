@@ -38,6 +38,14 @@ static void light_pattern(clt_session *session, size_t i) {
   }
 }
 
+/* The sum of 16 patterns that differ in the last four bits of i, weighted by 1/4 (-1)^(i0 i1 + i2 i3), is a pattern of
+ * zeros and ones itself: a bent function, whose transform has one magnitude (Rothaus 1976). Smaller orders have none
+ * of that size. */
+static double weight_in_sum(size_t i, size_t order) {
+  const size_t odd = (i & (i >> 1) & 1) ^ ((i >> 2) & (i >> 3) & 1);
+  return order < 16 ? 0 : odd ? -0.25 : 0.25;
+}
+
 /* In place, without scaling. */
 static void transform(float *values, size_t order) {
   for (size_t half = 1; half < order; half *= 2) {
@@ -56,6 +64,7 @@ static clt_status photograph(clt_session *session, size_t order, float *light, d
   const size_t values = clt_image_size(&session->seen);
   for (size_t i = 1; i < order; i++) {
     light_pattern(session, i);
+    session->weight = weight_in_sum(i, order);
     clt_status status = clt_session_observe(session, "hadamard", error);
     if (status != CLT_OK) {
       return status;

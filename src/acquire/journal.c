@@ -158,7 +158,14 @@ clt_status clt_journal_replay(clt_journal *journal, const clt_image *drive, clt_
 }
 
 bool clt_journal_is_replaying(const clt_journal *journal) {
-  return journal->file >= 0 && journal->replaying;
+  if (journal->file < 0 || !journal->replaying) {
+    return false;
+  }
+  record next;
+  struct stat file;
+  const off_t here = lseek(journal->file, 0, SEEK_CUR);
+  return here >= 0 && pread(journal->file, &next, sizeof next, here) == (ssize_t)sizeof next &&
+         fstat(journal->file, &file) == 0 && here + (off_t)(sizeof next + 2 * next.bytes) <= file.st_size;
 }
 
 bool clt_journal_next_is(const clt_journal *journal, const clt_image *drive) {

@@ -30,7 +30,7 @@ void clt_journal_close(clt_journal *journal);
  * here on are dropped, and clt_journal_add continues in their place. */
 clt_status clt_journal_replay(clt_journal *journal, const clt_image *drive, clt_image *seen, clt_image *deviation,
                               bool *found, clt_error *error);
-/* While observations are taken from the journal. */
+/* While observations are taken from the journal, and another whole one is there. */
 bool clt_journal_is_replaying(const clt_journal *journal);
 /* Whether the record that would be replayed next is of this drive; nothing is taken. */
 bool clt_journal_next_is(const clt_journal *journal, const clt_image *drive);

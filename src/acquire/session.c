@@ -9,15 +9,10 @@
 /* Between two tries at a device that fails. */
 #define PAUSE_FIRST_S 0.01
 #define PAUSE_LAST_S 1.0
-/* Part of its light by which a tile of the white picture may differ: lamps and mains are not steadier than that. The
- * black picture is mostly the room's own light, which flickers. */
-#define STEADY 0.01
-#define STEADY_BLACK 0.3
-/* The same of single cells, whose edges may shake, and the share of cells that may go wrong as defective pixels do. */
+/* Part of its light by which a single cell, whose edges may shake, may be above white, and the share of cells that may
+ * go wrong as defective pixels do. */
 #define STEADY_CELL 0.1
 #define DOUBTFUL_SHARE 0.01
-/* Disturbances after which it is no use to begin again. */
-enum { PASSES_MAX = 100 };
 
 clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquire_options *options, clt_error *error) {
   *session = (clt_session){.rig = rig, .options = *options, .started_ns = clt_clock_ns()};
@@ -33,9 +28,9 @@ clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquir
   return status == CLT_OK ? clt_journal_open(&session->journal, options->journal, info, error) : status;
 }
 
-clt_status clt_session_begin_watch(clt_session *session, clt_error *error) {
+clt_status clt_session_begin_watch(clt_session *session, bool kept, clt_error *error) {
   clt_status status = clt_watch_init(&session->watch, &session->options, &session->info, error);
-  return status == CLT_OK && session->options.journal == NULL && session->watch.every > 0
+  return status == CLT_OK && kept && session->options.journal == NULL && session->watch.every > 0
              ? clt_journal_open_unnamed(&session->journal, error)
              : status;
 }
@@ -133,8 +128,7 @@ static void note_doubt(clt_session *session) {
   watch->now_s = now.seconds;
 }
 
-/* Observes and counts the drive. */
-static clt_status observe_one(clt_session *session, const char *phase, clt_error *error) {
+clt_status clt_session_take(clt_session *session, const char *phase, clt_error *error) {
   clt_progress *progress = &session->progress;
   clt_status status = observe(session, error);
   if (status == CLT_CANCELLED) {
@@ -151,153 +145,40 @@ static clt_status observe_one(clt_session *session, const char *phase, clt_error
   return report(session, phase, error);
 }
 
-/* By patterns, by time, after a doubt; while the journal is replayed, where one was made. */
-static bool look_is_due(clt_session *session) {
-  const clt_watch *watch = &session->watch;
-  if (!watch->ready || watch->since == 0) {
-    return false;
-  }
-  return clt_journal_is_replaying(&session->journal)
-             ? clt_journal_next_is(&session->journal, &watch->white)
-             : watch->since >= watch->every || (watch->every_s > 0 && watch->now_s - watch->good_s >= watch->every_s);
-}
-
-clt_status clt_session_observe(clt_session *session, const char *phase, clt_error *error) {
+/* Summed patterns are checked by sums as well. */
+static clt_status observe_pattern(clt_session *session, bool summed, const char *phase, clt_error *error) {
   clt_watch *watch = &session->watch;
-  clt_status status = look_is_due(session) ? clt_session_look(session, error) : CLT_OK;
+  clt_status status = clt_session_look_before(session, summed, error);
   watch->since++;
-  status = status == CLT_OK ? observe_one(session, phase, error) : status;
+  status = status == CLT_OK ? clt_session_take(session, phase, error) : status;
   if (status == CLT_OK && watch->every > 0) {
     clt_watch_correct(watch, &session->black, &session->seen, &session->deviation);
+  }
+  if (status == CLT_OK && watch->ready && summed) {
+    const double weight = session->weight != 0 ? session->weight : clt_group_fit(&watch->group, &session->drive);
+    clt_group_add(&watch->group, weight, &session->drive, &session->seen, &session->deviation, &session->black);
   }
   return status;
 }
 
-void clt_session_mark_start(clt_session *session) {
-  clt_watch *watch = &session->watch;
-  watch->start = watch->good = clt_journal_here(&session->journal);
-  watch->start_done = watch->good_done = session->progress.done;
+clt_status clt_session_observe(clt_session *session, const char *phase, clt_error *error) {
+  return observe_pattern(session, true, phase, error);
 }
 
-static void mark_good(clt_session *session) {
-  clt_watch *watch = &session->watch;
-  watch->good = clt_journal_here(&session->journal);
-  watch->good_done = session->progress.done;
-  watch->since = 0;
-  watch->good_s = watch->now_s;
-  watch->troubled = false;
-}
-
-void clt_session_watch(clt_session *session) {
-  clt_watch *watch = &session->watch;
-  if (watch->every == 0) {
-    return;
-  }
-  size_t values = clt_image_size(&session->flood);
-  for (size_t i = 0; i < values; i++) {
-    watch->expected.data[i] = session->flood.data[i] + session->black.data[i];
-    watch->variance.data[i] = session->flood_variance.data[i];
-  }
-  watch->ready = true;
-  mark_good(session);
-}
-
-clt_status clt_session_begin_again(clt_session *session, bool *again, clt_error *error) {
-  clt_watch *watch = &session->watch;
-  *again = watch->again;
-  if (!watch->again) {
-    return CLT_OK;
-  }
-  watch->dropped += session->progress.done - watch->good_done;
-  session->progress.done = watch->start_done;
-  watch->again = watch->ready = false;
-  clt_watch_forget_lamp(watch);
-  return clt_journal_go_back(&session->journal, watch->start, watch->good, error);
-}
-
-static clt_status fail_changed(const clt_session *session, const clt_change *change, int looks, clt_error *error) {
-  const clt_watch *watch = &session->watch;
-  char what[160];
-  clt_change_format(change, what, sizeof what);
-  return clt_fail(error, CLT_FAILED,
-                  "the room changed while it was measured: %s since pattern %ld, in each of %d looks during %.3g s; "
-                  "keep people and lights out of it, let the lamp warm up, and measure again",
-                  what, watch->good_done, looks, watch->patience_s);
-}
-
-/* Looks until white is what it was. */
-static clt_status look_until_same(clt_session *session, int *looks, clt_error *error) {
-  clt_watch *watch = &session->watch;
-  const int64_t started_ns = clt_clock_ns();
-  clt_session_fill(session, 1);
-  for (*looks = 1;; ++*looks) {
-    clt_status status = observe_one(session, "look", error);
-    if (status != CLT_OK) {
-      return status;
-    }
-    clt_change change = clt_watch_compare_lamp(watch, &session->black, &session->seen, &session->deviation, STEADY);
-    if (!(change.share > 0)) {
-      return CLT_OK;
-    }
-    if (clt_clock_since(started_ns) >= watch->patience_s) {
-      return fail_changed(session, &change, *looks, error);
-    }
-  }
-}
-
-clt_status clt_session_look(clt_session *session, clt_error *error) {
-  clt_watch *watch = &session->watch;
-  if (!watch->ready || watch->since == 0) {
-    return CLT_OK;
-  }
-  int looks = 0;
-  size_t bytes = clt_image_size(&session->drive) * sizeof *session->drive.data;
-  memcpy(watch->drive.data, session->drive.data, bytes);
-  clt_status status = look_until_same(session, &looks, error);
-  memcpy(session->drive.data, watch->drive.data, bytes);
-  if (status != CLT_OK) {
-    return status;
-  }
-  if (looks > 1 || watch->troubled) {
-    watch->again = ++watch->passes <= PASSES_MAX;
-    return clt_fail(error, CLT_FAILED,
-                    "the room or the devices were disturbed after pattern %ld, and %d times before: keep people and "
-                    "lights out, check the devices, and measure again",
-                    watch->good_done, watch->passes - 1);
-  }
-  mark_good(session);
-  return CLT_OK;
-}
-
-/* Whether a repeat shows what the first one did, which is kept in the watch. Where not, all repeats are taken again. */
-static clt_status check_repeat(clt_session *session, int k, double tolerance, clt_error *error) {
-  clt_watch *watch = &session->watch;
-  size_t values = clt_image_size(&session->seen);
-  for (size_t i = 0; k == 0 && i < values; i++) {
-    watch->expected.data[i] = session->seen.data[i];
-    watch->variance.data[i] = session->deviation.data[i] * session->deviation.data[i];
-  }
-  clt_change change =
-      clt_watch_compare(&watch->expected, &watch->variance, &session->seen, &session->deviation, tolerance);
-  if (!(change.share > 0)) {
-    return CLT_OK;
-  }
-  watch->disturbed_ns = watch->disturbed_ns > 0 ? watch->disturbed_ns : clt_clock_ns();
-  watch->again = clt_clock_since(watch->disturbed_ns) < watch->patience_s;
-  return fail_changed(session, &change, k, error);
+clt_status clt_session_test(clt_session *session, const char *phase, clt_error *error) {
+  return observe_pattern(session, false, phase, error);
 }
 
 /* Sums and numbers of the valid observations. */
 static clt_status sum_repeats(clt_session *session, const char *phase, clt_image *sum, clt_image *count,
                               clt_error *error) {
   size_t values = clt_image_size(sum);
-  const double tolerance = session->drive.data[0] > 0 ? STEADY : STEADY_BLACK;
   memset(sum->data, 0, values * sizeof *sum->data);
   memset(count->data, 0, values * sizeof *count->data);
   for (int k = 0; k < session->options.repeats; k++) {
     clt_status status = clt_session_observe(session, phase, error);
     if (status == CLT_OK && session->watch.every > 0) {
-      status = check_repeat(session, k, tolerance, error);
+      status = clt_session_compare_repeat(session, k, error);
     }
     if (status != CLT_OK) {
       return status;
@@ -314,7 +195,7 @@ static clt_status sum_repeats(clt_session *session, const char *phase, clt_image
 
 clt_status clt_session_average(clt_session *session, const char *phase, clt_image *mean, clt_image *variance,
                                clt_error *error) {
-  mark_good(session);
+  clt_session_mark_good(session);
   /* Until all are there, mean holds the sums and variance the numbers. The deviations of the repeats are alike, so that
    * the last one stands for all. */
   clt_status status = sum_repeats(session, phase, mean, variance, error);

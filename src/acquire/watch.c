@@ -3,14 +3,15 @@
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
-
-#include "base/order.h"
+#include <stdlib.h>
 
 /* How far a lamp drifts; more is another light. */
 #define LAMP_MOST 0.1
 #define PATIENCE_DEFAULT_S 30.0
 #define DEVIATIONS 6.0
-enum { TILES = 16 };
+/* No tile is known better than to this part of its light. */
+#define EXACTEST 1e-6
+enum { TILES = 16, TILES_LEAST = 1 };
 
 clt_status clt_watch_init(clt_watch *watch, const clt_acquire_options *options, const clt_rig_info *info,
                           clt_error *error) {
@@ -18,7 +19,7 @@ clt_status clt_watch_init(clt_watch *watch, const clt_acquire_options *options, 
                        .every_s = options->watch_s,
                        .doubted = info->doubted,
                        .patience_s = options->patience_s > 0 ? options->patience_s : PATIENCE_DEFAULT_S};
-  clt_image *const images[] = {&watch->drive, &watch->white, &watch->expected, &watch->variance};
+  clt_image *const images[] = {&watch->white, &watch->expected, &watch->variance};
   clt_status status = CLT_OK;
   for (size_t i = 0; watch->every > 0 && status == CLT_OK && i < sizeof images / sizeof images[0]; i++) {
     status = clt_image_init(images[i], info->channels, info->height, info->width, error);
@@ -26,15 +27,20 @@ clt_status clt_watch_init(clt_watch *watch, const clt_acquire_options *options, 
   for (size_t k = 0; watch->every > 0 && status == CLT_OK && k < clt_image_size(&watch->white); k++) {
     watch->white.data[k] = 1;
   }
+  clt_group *const groups[] = {&watch->group, &watch->earlier};
+  for (size_t i = 0; watch->every > 0 && status == CLT_OK && i < 2; i++) {
+    status = clt_group_init(groups[i], info->channels, info->height, info->width, error);
+  }
   clt_watch_forget_lamp(watch);
   return status;
 }
 
 void clt_watch_finish(clt_watch *watch) {
-  clt_image_finish(&watch->drive);
   clt_image_finish(&watch->white);
   clt_image_finish(&watch->expected);
   clt_image_finish(&watch->variance);
+  clt_group_finish(&watch->group);
+  clt_group_finish(&watch->earlier);
 }
 
 /* Sums of the tile's cells from (x0, y0) up to (x1, y1). */
@@ -59,9 +65,9 @@ static void sum_tile(tile *t, const clt_image *expected, const clt_image *varian
   }
 }
 
-/* The k-th of the tiles, wide x high of them a channel. */
-static tile place_tile(const clt_image *image, int k) {
-  int wide = image->width < TILES ? image->width : TILES, high = image->height < TILES ? image->height : TILES;
+/* The k-th of the tiles, wide x high of them a channel; `side` or fewer in each direction. */
+static tile place_tile(const clt_image *image, int side, int k) {
+  int wide = image->width < side ? image->width : side, high = image->height < side ? image->height : side;
   int u = k % wide, v = k / wide % high;
   return (tile){.channel = k / (wide * high),
                 .x0 = u * image->width / wide,
@@ -70,18 +76,19 @@ static tile place_tile(const clt_image *image, int k) {
                 .y1 = (v + 1) * image->height / high};
 }
 
-static int count_tiles(const clt_image *image) {
-  return (image->width < TILES ? image->width : TILES) * (image->height < TILES ? image->height : TILES);
+static int count_tiles(const clt_image *image, int side) {
+  return (image->width < side ? image->width : side) * (image->height < side ? image->height : side);
 }
 
 /* By factors lamp of what is above black; black NULL: by none. */
-static clt_change compare(const clt_image *expected, const clt_image *variance, const clt_image *black,
-                          const double *lamp, const clt_image *seen, const clt_image *deviation, double tolerance) {
-  int count = count_tiles(seen) * seen->channels, changed = 0;
+static clt_change compare_tiles(int side, const clt_image *expected, const clt_image *variance, const clt_image *black,
+                                const double *lamp, const clt_image *seen, const clt_image *deviation,
+                                double tolerance) {
+  int count = count_tiles(seen, side) * seen->channels, changed = 0;
   double most = 0;
   clt_change change = {0};
   for (int k = 0; k < count; k++) {
-    tile t = place_tile(seen, k);
+    tile t = place_tile(seen, side, k);
     sum_tile(&t, expected, variance, black, seen, deviation);
     double brighter = black != NULL ? (lamp[t.channel] - 1) * (t.light - t.dark) : 0;
     double apart = t.difference - brighter, allowed = DEVIATIONS * sqrt(t.noise) + tolerance * fabs(t.light);
@@ -97,40 +104,61 @@ static clt_change compare(const clt_image *expected, const clt_image *variance, 
   return change;
 }
 
+/* What is little in every tile but alike in many is seen in larger ones. */
+static clt_change compare(const clt_image *expected, const clt_image *variance, const clt_image *black,
+                          const double *lamp, const clt_image *seen, const clt_image *deviation, double tolerance) {
+  clt_change change = {0};
+  for (int side = TILES; side >= TILES_LEAST && !(change.share > 0); side /= 2) {
+    change = compare_tiles(side, expected, variance, black, lamp, seen, deviation, tolerance);
+  }
+  return change;
+}
+
 clt_change clt_watch_compare(const clt_image *expected, const clt_image *variance, const clt_image *seen,
                              const clt_image *deviation, double tolerance) {
   return compare(expected, variance, NULL, NULL, seen, deviation, tolerance);
 }
 
-/* The median over a channel's tiles of how much brighter they are; 1 where that is no lamp. */
-static double find_lamp(const clt_watch *watch, const clt_image *black, const clt_image *seen,
-                        const clt_image *deviation, int channel) {
-  double ratio[TILES * TILES];
+/* How much brighter a tile is, and how exactly that is known. */
+typedef struct tile_ratio {
+  double ratio, weight;
+} tile_ratio;
+
+static int by_ratio(const void *a, const void *b) {
+  const double x = ((const tile_ratio *)a)->ratio, y = ((const tile_ratio *)b)->ratio;
+  return (x > y) - (x < y);
+}
+
+/* The weighted median over a channel's tiles of how much brighter they are; 1 where that is no lamp. */
+static double find_lamp(const clt_image *expected, const clt_image *variance, const clt_image *black,
+                        const clt_image *seen, const clt_image *deviation, int channel) {
+  tile_ratio tiles[TILES * TILES];
+  const int all = count_tiles(seen, TILES);
   size_t count = 0;
-  for (int k = 0; k < count_tiles(seen); k++) {
-    tile t = place_tile(seen, channel * count_tiles(seen) + k);
-    sum_tile(&t, &watch->expected, &watch->variance, black, seen, deviation);
-    double light = t.light - t.dark;
+  double whole = 0, below = 0, lamp = 1;
+  for (int k = 0; k < all; k++) {
+    tile t = place_tile(seen, TILES, channel * all + k);
+    sum_tile(&t, expected, variance, black, seen, deviation);
+    double light = t.light - t.dark, weight = light / (sqrt(t.noise) + EXACTEST * fabs(light));
     if (light > DEVIATIONS * sqrt(t.noise)) {
-      ratio[count++] = 1 + t.difference / light;
+      tiles[count++] = (tile_ratio){1 + t.difference / light, weight};
+      whole += weight;
     }
   }
-  clt_sort_doubles(ratio, count);
-  double lamp = count > 0 ? ratio[count / 2] : 1;
+  qsort(tiles, count, sizeof *tiles, by_ratio);
+  for (size_t k = 0; k < count && below <= whole / 2; k++) {
+    below += tiles[k].weight;
+    lamp = tiles[k].ratio;
+  }
   return fabs(lamp - 1) <= LAMP_MOST ? lamp : 1;
 }
 
-clt_change clt_watch_compare_lamp(clt_watch *watch, const clt_image *black, const clt_image *seen,
-                                  const clt_image *deviation, double tolerance) {
-  double lamp[CLT_CHANNELS_MAX];
+clt_change clt_watch_compare_lamp(const clt_image *expected, const clt_image *variance, const clt_image *black,
+                                  const clt_image *seen, const clt_image *deviation, double tolerance, double *lamp) {
   for (int c = 0; c < seen->channels; c++) {
-    lamp[c] = find_lamp(watch, black, seen, deviation, c);
+    lamp[c] = find_lamp(expected, variance, black, seen, deviation, c);
   }
-  clt_change change = compare(&watch->expected, &watch->variance, black, lamp, seen, deviation, tolerance);
-  for (int c = 0; c < seen->channels && !(change.share > 0); c++) {
-    watch->lamp[c] = lamp[c];
-  }
-  return change;
+  return compare(expected, variance, black, lamp, seen, deviation, tolerance);
 }
 
 void clt_watch_correct(const clt_watch *watch, const clt_image *black, clt_image *seen, clt_image *deviation) {

@@ -19,7 +19,7 @@ static const cli_option options[] = {
     {"replay", 0, "DIR", "take the frames from a recording, no device is opened"},
     {"threshold", 0, "X", "hierarchical: fraction of a cell's light left unresolved (0..0.5)"},
     {"repeats", 0, "N", "observations averaged for black and flood (1..256)"},
-    {"watch", 0, "N", "patterns between two looks at the room (0: none; default 25)"},
+    {"watch", 0, "N", "patterns between two looks at their sum and the room (0: none; default 25)"},
     {"patience", 0, "X", "seconds to wait for a room or device that is disturbed (default 30)"},
     {NULL, 0, NULL, NULL},
 };

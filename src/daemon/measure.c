@@ -21,6 +21,7 @@ typedef struct measurer {
   clt_station *station;     /* lent by main from calibration on */
   clt_projector *standin;   /* outlives the station's rig */
   clt_projector_info panel; /* that the rig was made for */
+  clt_panel light;          /* of its codes, as the rig knows it */
   measure_job *waiting;     /* came while another was worked on */
   uint64_t number;          /* of the job in work */
   camera_frames closed;     /* by rigs that are closed */
@@ -96,6 +97,7 @@ static clt_status open_camera(measurer *self, const measure_job *job, clt_error 
     self->standin = NULL;
   }
   self->panel = job->projector;
+  self->light = clt_station_rig_config(&job->config, station).projector;
   status = standin_create(self->boxes, &self->panel, &self->standin, error);
   return status == CLT_OK ? clt_station_open_rig(&job->config, station, self->standin, error) : status;
 }
@@ -192,21 +194,24 @@ static double find_brightness(const daemon_model *model, const clt_image *predic
 }
 
 /* A picture in which no lit cell was seen tells nothing of T: it is verified without. */
-static void check_fit(const measure_job *job, const clt_image *deviation, measure_result *result) {
+static void check_fit(const measurer *self, const measure_job *job, const clt_image *deviation,
+                      measure_result *result) {
   const daemon_model *model = job->model;
   clt_error problem = {0};
-  clt_image predicted = {0};
+  clt_image shown = {0}, predicted = {0};
   if (model == NULL) {
     return;
   }
-  result->checked = clt_predict(model->transport, &job->picture.drive, &predicted, &problem) == CLT_OK &&
-                    clt_loop_check(model->transport, model->certificate, &job->picture.drive, &result->observation,
-                                   deviation, &result->fit, &problem) == CLT_OK;
+  result->checked = clt_panel_shown(&self->light, self->panel.bits, &job->picture.drive, &shown, &problem) == CLT_OK &&
+                    clt_predict(model->transport, &shown, &predicted, &problem) == CLT_OK &&
+                    clt_loop_check(model->transport, model->certificate, &shown, &result->observation, deviation,
+                                   &result->fit, &problem) == CLT_OK;
   if (result->checked) {
     result->brightness = find_brightness(model, &predicted, &result->observation, deviation);
   } else {
     clt_log(CLT_LOG_INFO, "whether T still fits is not known: %s", problem.message);
   }
+  clt_image_finish(&shown);
   clt_image_finish(&predicted);
 }
 
@@ -222,7 +227,7 @@ static clt_status verify(measurer *self, const measure_job *job, measure_result 
                             : status;
   if (status == CLT_OK) {
     result->verified_error = measure_error(&result->observation, &deviation, &job->picture.target, &job->picture.lit);
-    check_fit(job, &deviation, result);
+    check_fit(self, job, &deviation, result);
   }
   clt_image_finish(&deviation);
   return status;

@@ -127,6 +127,22 @@ clt_status clt_panel_decode(const clt_panel *panel, const clt_image *codes, clt_
   return CLT_OK;
 }
 
+clt_status clt_panel_shown(const clt_panel *panel, int bits, const clt_image *drive, clt_image *shown,
+                           clt_error *error) {
+  const float top = (float)((1 << bits) - 1);
+  clt_image codes = {0};
+  clt_status status = clt_image_init(&codes, drive->channels, drive->height, drive->width, error);
+  if (status == CLT_OK) {
+    clt_panel_encode(panel, drive, drive->channels, drive->height, drive->width, codes.data);
+    for (size_t i = 0; i < clt_image_size(&codes); i++) {
+      codes.data[i] = roundf(codes.data[i] * top) / top;
+    }
+    status = clt_panel_decode(panel, &codes, shown, error);
+  }
+  clt_image_finish(&codes);
+  return status;
+}
+
 clt_status clt_panel_write(const char *path, const clt_panel *panel, const clt_image *drive, clt_error *error) {
   static const clt_curve as_it_is = {.kind = CLT_CURVE_LINEAR};
   if (clt_image_path_is_linear(path)) {

@@ -2,10 +2,10 @@
  *
  * Usage: bench_schemes SCENES SCENE WIDTH HEIGHT SCHEME[:VALUE] ... (SCENES: the folder of the scene files). VALUE is
  * the wanted error of "blocks", the threshold of "hierarchical" or the photographs of "optical". Prints a line of
- * tab-separated values for each: scene, grid, scheme, value, patterns, seconds on a 30 fps camera that takes 4
- * exposures of each, then in percent how far T is from the exact one in what it predicts of the four pictures driven,
- * and how far their compensation is from the target in the room. Pictures: coffee (a photograph, with CLT_SHARED),
- * fields of 8 cells, random, one half white; each compressed to 0.4..1. */
+ * tab-separated values for each: scene, grid, scheme, value, patterns, looks and sums among them, seconds on a 30 fps
+ * camera that takes 4 exposures of each, then in percent how far T is from the exact one in what it predicts of the
+ * four pictures driven, and how far their compensation is from the target in the room. Pictures: coffee (a photograph,
+ * with CLT_SHARED), fields of 8 cells, random, one half white; each compressed to 0.4..1. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -144,24 +144,33 @@ static void judge(const clt_scene *scene, const clt_transport *transport) {
   clt_certificate_destroy(certificate);
 }
 
-static void print_head(const char *scene, const clt_rig_info *info, const char *scheme, const char *value,
-                       int patterns) {
-  printf("%s\t%dx%d\t%s\t%s\t%d\t%.0f", scene, info->width, info->height, scheme, value != NULL ? value : "-", patterns,
-         (double)patterns * EXPOSURES / FPS);
+static void print_head(const char *scene, const clt_rig_info *info, const char *scheme, const char *value, int patterns,
+                       int looks) {
+  printf("%s\t%dx%d\t%s\t%s\t%d\t%d\t%.0f", scene, info->width, info->height, scheme, value != NULL ? value : "-",
+         patterns, looks, (double)patterns * EXPOSURES / FPS);
+}
+
+/* Counts the patterns that only watch the room. */
+static bool count_looks(void *context, const clt_progress *progress) {
+  *(int *)context += strcmp(progress->phase, "look") == 0 || strcmp(progress->phase, "sum") == 0;
+  return true;
 }
 
 static void measure(const clt_station *station, const clt_acquire_options *defaults, const char *scene,
                     const char *scheme, const char *value) {
   clt_error error = {0};
+  int looks = 0;
   clt_acquire_options options = *defaults;
   options.scheme = scheme;
+  options.progress = count_looks;
+  options.context = &looks;
   options.error = value != NULL ? atof(value) : 0;
   options.threshold = value != NULL && strcmp(scheme, "hierarchical") == 0 ? atof(value) : 0;
   clt_transport *transport = NULL;
   clt_rig_info info;
   station->rig->operations->describe(station->rig, &info);
   need(clt_acquire(station->rig, &options, &transport, &error), &error);
-  print_head(scene, &info, scheme, value, clt_transport_origin(transport)->patterns);
+  print_head(scene, &info, scheme, value, clt_transport_origin(transport)->patterns, looks);
   judge(station->scene, transport);
   printf("\t%.2f\t%.0f\n", 100 * clt_transport_origin(transport)->error,
          (double)clt_transport_describe(transport).bytes / 1048576);
@@ -193,7 +202,7 @@ static void solve_optically(const clt_station *station, const char *scene, const
     clt_image_finish(&drive);
     clt_image_finish(&seen);
   }
-  print_head(scene, &info, "optical", value, most);
+  print_head(scene, &info, "optical", value, most, 0);
   printf("\t-\t-\t-\t-");
   for (int k = 0; k < PICTURES; k++) {
     printf("\t%.2f", 100 * after[k]);

@@ -18,9 +18,12 @@ typedef struct fake_rig {
   size_t blind;  /* this cell is never seen; SIZE_MAX: none */
   uint64_t random;
   long patterns;
-  double pattern_s;      /* of the devices' time */
-  long doubted;          /* patterns at which exposures contradicted each other */
-  double lamp_gain;      /* of the light, black aside, in pattern n: 1 + lamp_gain sin(n / 20) */
+  double pattern_s; /* of the devices' time */
+  long doubted;     /* patterns at which exposures contradicted each other */
+  double lamp_gain; /* of the light, black aside, in pattern n: 1 + lamp_gain sin(n / 20) */
+  long shaded_at;   /* in that pattern the cells of the left third have `shade` of their light; 0: never */
+  double shade;
+  double bend;           /* the camera gives light^(1 + bend) */
   unsigned pause_us;     /* that an observation takes */
   long dies_at;          /* kill -9 of the process before that pattern; 0: never */
   clt_status fails_with; /* from pattern fails_at on */
@@ -78,6 +81,8 @@ static inline clt_status fake_observe(clt_rig *base, const clt_image *drive, clt
     for (size_t i = 0; i < cells; i++) {
       double light = fake_light(rig, c, i, x, lit, count);
       light = rig->black + (light - rig->black) * (1 + rig->lamp_gain * sin((double)rig->patterns / 20));
+      light *= rig->patterns == rig->shaded_at && i % (size_t)rig->width < (size_t)rig->width / 3 ? rig->shade : 1;
+      light = rig->bend != 0 ? pow(light, 1 + rig->bend) : light;
       double sigma = sqrt(rig->dark * rig->dark + rig->photon * light);
       radiance->data[(size_t)c * cells + i] = (float)(light + sigma * (sigma > 0 ? test_normal(&rig->random) : 0));
       deviation->data[(size_t)c * cells + i] = i == rig->blind ? INFINITY : (float)sigma;

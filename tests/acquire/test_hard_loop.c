@@ -159,6 +159,48 @@ static void case_24_projector_moved_by_one_pixel(void **state) {
   free(room);
 }
 
+/* A panel of 8 bits and a camera of little noise: the drive that was asked for is a misfit by the panel's rounding
+ * alone, the one that was shown fits. */
+static void a_rounded_drive_is_no_misfit(void **state) {
+  (void)state;
+  double *room = dihedral_transport(WIDTH, HEIGHT, .6);
+  const clt_curve curve = {.kind = CLT_CURVE_GAMMA, .gamma = 2.2};
+  const clt_panel panel = clt_panel_of_curve(&curve);
+  clt_image drive = {0}, seen = {0}, deviation = {0};
+  clt_error error = {0};
+  assert_ok(clt_image_init(&drive, 1, HEIGHT, WIDTH, &error), error);
+  assert_ok(clt_image_init(&seen, 1, HEIGHT, WIDTH, &error), error);
+  assert_ok(clt_image_init(&deviation, 1, HEIGHT, WIDTH, &error), error);
+  int misfits = 0;
+  for (uint64_t seed = 1; seed <= 100; seed++) {
+    uint64_t random = seed;
+    clt_transport *transport = measured(room, 0, &random);
+    clt_certificate *certificate = NULL;
+    clt_image shown = {0};
+    clt_fit fit;
+    assert_ok(clt_certify(transport, &certificate, &error), error);
+    fill_picture(&drive, &random);
+    assert_ok(clt_panel_shown(&panel, 8, &drive, &shown, &error), error);
+    photograph(room, &shown, 0, 2e-4, &random, &seen, &deviation);
+    assert_ok(clt_loop_check(transport, certificate, &drive, &seen, &deviation, &fit, &error), error);
+    misfits += !fit.fits;
+    assert_ok(clt_loop_check(transport, certificate, &shown, &seen, &deviation, &fit, &error), error);
+    assert_true(fit.fits);
+    photograph(room, &shown, 1, 2e-4, &random, &seen, &deviation);
+    assert_ok(clt_loop_check(transport, certificate, &shown, &seen, &deviation, &fit, &error), error);
+    assert_false(fit.fits);
+    clt_image_finish(&shown);
+    clt_certificate_destroy(certificate);
+    clt_transport_destroy(transport);
+  }
+  print_message("the drive as it was asked for is a misfit in %d of 100\n", misfits);
+  assert_true(misfits > 90);
+  clt_image_finish(&drive);
+  clt_image_finish(&seen);
+  clt_image_finish(&deviation);
+  free(room);
+}
+
 /* The growth of a small deviation, per step, of a loop whose room is `bright` times as bright as its T says: omega
  * sigma is gain * bright where T^-1 corrects, whatever the albedo. */
 static double growth(const clt_transport *transport, const clt_certificate *certificate, clt_loop_options options,
@@ -295,6 +337,7 @@ static void a_gain_that_does_not_settle_is_refused(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(case_12_bias_in_every_entry),
+      cmocka_unit_test(a_rounded_drive_is_no_misfit),
       cmocka_unit_test(case_24_projector_moved_by_one_pixel),
       cmocka_unit_test(case_27_loop_delay),
       cmocka_unit_test(a_gain_that_does_not_settle_is_refused),

@@ -83,6 +83,30 @@ static void cells_share_out_any_panel(void **state) {
   }
 }
 
+/* Rounded to a code of `bits`, in double; what a panel gives exactly stays. */
+static void what_is_shown_is_rounded(void **state) {
+  (void)state;
+  static const int depths[] = {1, 6, 8, 10, 16};
+  const clt_curve curve = {.kind = CLT_CURVE_GAMMA, .gamma = 2.2};
+  clt_panel panel = clt_panel_of_curve(&curve);
+  clt_error error = {0};
+  clt_image drive = {0}, shown = {0};
+  assert_ok(clt_image_init(&drive, 3, 5, 20, &error), error);
+  for (int i = 0; i < 300; i++) {
+    drive.data[i] = (float)(i % 100) / 99;
+  }
+  for (size_t n = 0; n < sizeof depths / sizeof depths[0]; n++) {
+    double top = (1 << depths[n]) - 1;
+    assert_ok(clt_panel_shown(&panel, depths[n], &drive, &shown, &error), error);
+    for (int i = 0; i < 300; i++) {
+      double code = round(pow((double)drive.data[i], 1 / 2.2) * top) / top;
+      assert_near(shown.data[i], pow(code, 2.2), 1e-6);
+    }
+    clt_image_finish(&shown);
+  }
+  clt_image_finish(&drive);
+}
+
 static void hopeless_panels_are_refused(void **state) {
   (void)state;
   const double grey[9] = {1, 1, 1, 1, 1, 1, 1, 1, 1}, dark[9] = {1, 0, 0, 0, 0, 0, 0, 0, 1};
@@ -100,6 +124,7 @@ int main(void) {
       cmocka_unit_test(codes_give_the_light_that_was_asked_for),
       cmocka_unit_test(light_beyond_the_panel_is_clipped),
       cmocka_unit_test(cells_share_out_any_panel),
+      cmocka_unit_test(what_is_shown_is_rounded),
       cmocka_unit_test(hopeless_panels_are_refused),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

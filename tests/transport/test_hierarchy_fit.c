@@ -123,7 +123,8 @@ static void test_products(void **unused) {
           assert_near(own[i], row[i], 1e-3 * row[i]);
         }
       }
-      print_message("%ld near entries, %zu bytes of %zu\n", (long)clt_hierarchic_of(made)->start[CELLS], clt_transport_describe(made).bytes, clt_transport_describe(dense).bytes);
+      print_message("%ld near entries, %zu bytes of %zu\n", (long)clt_hierarchic_of(made)->start[CELLS],
+                    clt_transport_describe(made).bytes, clt_transport_describe(dense).bytes);
       clt_transport_destroy(made);
     }
     clt_transport_destroy(dense);
