@@ -37,7 +37,7 @@ static void measure_white(clt_live *live) {
 /* The hierarchy, where T has one that is worth it. */
 static clt_status choose_form(clt_live *live, clt_error *error) {
   static const double LEFT_OUT = 5e-3;                /* by a leaf, of a cell's light */
-  enum { WORTH_IT = 256, MOST = 32768, SMALLER = 3 }; /* cells, and cells; bytes of T by those of the hierarchy */
+  enum { WORTH_IT = 768, MOST = 32768, SMALLER = 3 }; /* cells, and cells; bytes of T by those of the hierarchy */
   const clt_transport_info *info = &live->info;
   const bool is_hierarchy = strcmp(info->storage, "hierarchy") == 0, is_blocks = strcmp(info->storage, "blocks") == 0;
   clt_error why;
