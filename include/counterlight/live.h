@@ -43,6 +43,10 @@ typedef struct clt_live_result {
   double total_ms;
 } clt_live_result;
 
+/* T in the storage by which moving pictures go, which a solver makes for itself where it is not given it: *out, or NULL
+ * where the transport serves as it is. Seconds of work, but from blocks. CLT_FAILED where memory is short. */
+CLT_PUBLIC clt_status clt_live_convert(const clt_transport *transport, clt_transport **out, clt_error *error);
+
 /* Makes a solver for a transport with rows = cols. transport and certificate outlive it. CLT_BAD_INPUT for options out
  * of range and for a transport that observes other cells than it drives. */
 CLT_PUBLIC clt_status clt_live_create(const clt_transport *transport, const clt_certificate *certificate,

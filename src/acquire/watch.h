@@ -18,9 +18,9 @@ typedef struct clt_change {
   double percent; /* by which that tile is brighter (or darker, below 0) */
 } clt_change;
 
-/* Compares sums over tiles, at most 16 x 16, 8 x 8 and 4 x 4 of them: a tile has changed where its difference is above
- * its noise and above `tolerance` of its light. The finest in which some have tells. Values with an infinite variance
- * in either are left out. */
+/* Compares sums over tiles, at most 16 x 16, 8 x 8 and so on down to the whole: a tile has changed where its difference
+ * is above its noise and above `tolerance` of its light. The finest in which some have tells. Values with an infinite
+ * variance in either are left out. */
 clt_change clt_watch_compare(const clt_image *expected, const clt_image *variance, const clt_image *seen,
                              const clt_image *deviation, double tolerance);
 

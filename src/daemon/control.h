@@ -128,6 +128,8 @@ void control_on_measured(control *self, measure_result *letter);
 void control_on_solved(control *self, solver_result *letter);
 void control_finish_jobs(control *self);
 
+/* plays.c: the configured content moves while it is what is shown; what `show` brings is always a picture. */
+bool control_moves(const control *self);
 /* plays.c: has the content move, where it does and that is not so yet; ends that with the daemon. */
 void control_play(control *self);
 void control_stop_moving(control *self);

@@ -56,6 +56,7 @@ static void fill_solve(const control *self, solver_job *job) {
   job->tolerance = config->solve.tolerance;
   job->deadline_s = config->solve.deadline_s;
   job->white = config->white;
+  job->moves = control_moves(self);
 }
 
 static void fill_content(control *self, solver_job *job) {

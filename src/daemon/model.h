@@ -9,12 +9,14 @@
 
 typedef struct daemon_model {
   clt_transport *transport;
+  clt_transport *moving; /* what moving pictures go by (clt_live_convert); NULL: the transport, or it is not made yet */
   clt_certificate *certificate;
   atomic_uint holders;
 } daemon_model;
 
-/* Certifies the transport and takes it over; on failure it stays the caller's. The maker is the first holder. */
-clt_status model_create(clt_transport *transport, daemon_model **out, clt_error *error);
+/* Certifies the transport and takes it over; on failure it stays the caller's. Where content moves, what that takes is
+ * made as well. The maker is the first holder. */
+clt_status model_create(clt_transport *transport, bool moves, daemon_model **out, clt_error *error);
 /* One holder more; gives the model back. Accepts NULL. */
 daemon_model *model_hold(daemon_model *model);
 /* One holder less; the last one frees it. Accepts NULL. */

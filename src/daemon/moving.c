@@ -100,7 +100,9 @@ static void take_job(mover *self, moving_job *job) {
     status = player_create(job->path, &options, &self->playing, &error);
   }
   if (status == CLT_OK && self->playing != NULL && job->model != NULL) {
-    status = clt_frames_create(job->model->transport, job->model->certificate, &job->frames, &self->frames, &error);
+    const daemon_model *model = job->model;
+    status = clt_frames_create(model->moving != NULL ? model->moving : model->transport, model->certificate,
+                               &job->frames, &self->frames, &error);
   }
   if (status != CLT_OK) {
     clt_log(CLT_LOG_ERROR, "what moves is not shown, the picture stays: %s", error.message);

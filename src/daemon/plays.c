@@ -6,8 +6,7 @@
 #include "daemon/control.h"
 #include "image/film.h"
 
-/* The configured content moves while it is what is shown; what `show` brings is always a picture. */
-static bool moves(const control *self) {
+bool control_moves(const control *self) {
   return strcmp(self->found.content, self->config.content) == 0 && clt_film_moves(self->config.content);
 }
 
@@ -19,7 +18,7 @@ static void describe(const control *self, moving_job *job) {
                       .model = found->model,
                       .frames = {.live = self->config.live, .white = self->config.white, .reach = self->config.reach},
                       .picture_s = self->config.picture_s};
-  if (moves(self)) {
+  if (control_moves(self)) {
     snprintf(job->path, sizeof job->path, "%s", self->config.content);
   }
 }
@@ -57,7 +56,7 @@ void control_stop_moving(control *self) {
 }
 
 void control_on_moved(control *self, const moving_report *letter) {
-  if (letter->serial == self->found.content_serial && moves(self)) {
+  if (letter->serial == self->found.content_serial && control_moves(self)) {
     self->found.moved = *letter;
     server_notify_latest(self->service, "frames", control_moving_note(self));
   }

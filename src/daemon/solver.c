@@ -143,7 +143,7 @@ static clt_status load(solver *self, solver_job *job, solver_result *result) {
   if (stored == NULL) {
     return CLT_OK;
   }
-  clt_status status = model_create(stored, &model, &result->error);
+  clt_status status = model_create(stored, job->moves, &model, &result->error);
   if (status != CLT_OK) {
     clt_transport_destroy(stored);
     return status;
@@ -156,7 +156,7 @@ static clt_status load(solver *self, solver_job *job, solver_result *result) {
 static clt_status adopt(solver *self, solver_job *job, solver_result *result) {
   daemon_model *model = NULL;
   clt_error problem = {0};
-  clt_status status = model_create(job->transport, &model, &result->error);
+  clt_status status = model_create(job->transport, job->moves, &model, &result->error);
   if (status != CLT_OK) {
     return status;
   }

@@ -7,6 +7,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "image/cell_means.h"
+#include "solve/live.h"
 #include "solve/mapping.h"
 
 enum { COLOURS = 3 };
@@ -53,12 +54,14 @@ static clt_status prepare(clt_frames *self, const clt_frames_options *options, c
   self->then_target = self->drive + values;
   self->then_drive = self->then_target + values;
   clt_status status = find_white(self, &options->white, error);
+  if (status == CLT_OK) {
+    status = clt_live_create(self->transport, self->certificate, &options->live, &self->live, error);
+  }
   if (status == CLT_OK && (options->reach || options->white.kind == CLT_WHITE_FEASIBLE)) {
     double smooth_s = options->smooth_s > 0 ? options->smooth_s : SMOOTH_S;
-    status = clt_mapping_create(self->transport, self->certificate, self->white, smooth_s, &self->mapping, error);
+    status = clt_mapping_create(self->live->transport, self->certificate, self->white, smooth_s, &self->mapping, error);
   }
-  return status == CLT_OK ? clt_live_create(self->transport, self->certificate, &options->live, &self->live, error)
-                          : status;
+  return status;
 }
 
 clt_status clt_frames_create(const clt_transport *transport, const clt_certificate *certificate,

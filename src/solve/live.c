@@ -34,24 +34,32 @@ static void measure_white(clt_live *live) {
   live->white_norm = sqrt(sum);
 }
 
-/* The hierarchy, where T has one that is worth it. */
-static clt_status choose_form(clt_live *live, clt_error *error) {
-  static const double LEFT_OUT = 5e-3;                /* by a leaf, of a cell's light */
-  enum { WORTH_IT = 768, MOST = 32768, SMALLER = 3 }; /* cells, and cells; bytes of T by those of the hierarchy */
-  const clt_transport_info *info = &live->info;
-  const bool is_hierarchy = strcmp(info->storage, "hierarchy") == 0, is_blocks = strcmp(info->storage, "blocks") == 0;
-  clt_error why;
-  clt_status status = CLT_OK;
-  if (is_blocks) {
-    status = clt_transport_create_hierarchy(live->transport, LEFT_OUT, &live->made, error);
-  } else if (!is_hierarchy && info->cols >= WORTH_IT && info->cols <= MOST &&
-             clt_transport_create_hierarchy(live->transport, LEFT_OUT, &live->made, &why) == CLT_OK &&
-             SMALLER * clt_transport_describe(live->made).bytes > info->bytes) {
-    clt_transport_destroy(live->made);
-    live->made = NULL;
+/* A hierarchy by rows is worth it from so many cells on, where it is so much smaller; its time grows with their square.
+ */
+clt_status clt_live_convert(const clt_transport *transport, clt_transport **out, clt_error *error) {
+  static const double LEFT_OUT = 5e-3; /* by a leaf, of a cell's light */
+  enum { CELLS_LEAST = 768, CELLS_MOST = 8192, SMALLER = 3 };
+  const clt_transport_info info = clt_transport_describe(transport);
+  *out = NULL;
+  if (strcmp(info.storage, "blocks") == 0) {
+    return clt_transport_create_hierarchy(transport, LEFT_OUT, out, error);
   }
+  if (strcmp(info.storage, "hierarchy") == 0 || info.cols < CELLS_LEAST || info.cols > CELLS_MOST) {
+    return CLT_OK;
+  }
+  const clt_status status = clt_transport_create_hierarchy(transport, LEFT_OUT, out, error);
+  if (status == CLT_OK && SMALLER * clt_transport_describe(*out).bytes > info.bytes) {
+    clt_transport_destroy(*out);
+    *out = NULL;
+  }
+  return status == CLT_BAD_INPUT ? CLT_OK : status; /* light without order: by products */
+}
+
+static clt_status choose_form(clt_live *live, clt_error *error) {
+  const clt_status status = clt_live_convert(live->transport, &live->made, error);
   live->transport = live->made != NULL ? live->made : live->transport;
-  live->form = live->made != NULL || is_hierarchy ? &clt_live_hierarchic : &clt_live_general;
+  live->form = strcmp(clt_transport_describe(live->transport).storage, "hierarchy") == 0 ? &clt_live_hierarchic
+                                                                                         : &clt_live_general;
   return status;
 }
 

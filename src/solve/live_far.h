@@ -85,6 +85,7 @@ struct clt_far {
   const clt_live_kernels *kernels;
   int width, channels;
   size_t cells, items, rank;
+  bool shared;                      /* passes are long enough for threads */
   clt_live_item *item;              /* channel by channel, leaf by leaf */
   size_t strips;                    /* of rows, in all items */
   size_t blocks;                    /* of near light, in all items */
@@ -110,7 +111,7 @@ struct clt_far {
   float *factor;                    /* per channel: two, of twice as many columns as the most that are coupled */
   size_t order;                     /* that many */
   int *pivots;                      /* of both factors: where no cell is held, and where some are */
-  float *partial;                   /* channels x CLT_NEWTON_CHUNKS x 2R */
+  float *partial;                   /* channels x CLT_HIERARCHY_CHUNKS x 2R */
   float *tall;                      /* 4L x R: room for the products that make a factor */
 };
 

@@ -8,7 +8,7 @@
 #include "base/memory.h"
 #include "solve/live_far.h"
 
-enum { STEPS_MAX = 40, STALE_STEPS = 5, ITEMS_AT_ONCE = 8 };
+enum { STEPS_MAX = 40, STALE_STEPS = 5, ITEMS_AT_ONCE = 8, WORTH_SHARING = 16384 /* values */ };
 static const double WORSE = 1.001; /* of the least objective: above it a step has gone too far */
 static const double MOVED = 0.01; /* of the lit cells: held otherwise than in the factor, from which it is taken anew */
 static const double SLOW = 0.3;   /* of the gap before: what a step leaves with a factor that has aged */
@@ -70,7 +70,8 @@ static clt_status create(clt_live *live, clt_error *error) {
                    .channels = live->info.channels,
                    .cells = live->info.cols,
                    .items = hierarchy->leaves * (size_t)live->info.channels,
-                   .rank = hierarchy->rank};
+                   .rank = hierarchy->rank,
+                   .shared = values_of(live) >= WORTH_SHARING};
   far->item = clt_alloc(far->items, sizeof *far->item);
   if (far->item == NULL) {
     return clt_fail(error, CLT_FAILED, "no memory for moving pictures of %zu cells", far->cells);
@@ -136,7 +137,7 @@ static void add_up(clt_far *far, frame *at) {
 
 /* The residual and gap of the drive that is known, for the target. */
 static void aim(clt_far *far, frame *at) {
-#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE)
+#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE) if (far->shared)
   for (size_t k = 0; k < far->items; k++) {
     far->kernels->aim(far, &far->item[k]);
   }
@@ -146,7 +147,7 @@ static void aim(clt_far *far, frame *at) {
 /* The same of the drive that was changed. */
 static void look(clt_far *far, frame *at, clt_live_result *result) {
   const int64_t since_ns = clt_clock_ns();
-#pragma omp parallel
+#pragma omp parallel if (far->shared)
   {
     clt_newton_gather(far);
 #pragma omp for schedule(dynamic, ITEMS_AT_ONCE)
@@ -167,7 +168,7 @@ static bool is_near(clt_far *far, const frame *at, double enough, clt_live_resul
   }
   const int64_t since_ns = clt_clock_ns();
   double drift[CLT_CHANNELS_MAX] = {0}, drifts = 0;
-#pragma omp parallel
+#pragma omp parallel if (far->shared)
   clt_newton_drift(far, drift);
   for (int c = 0; c < far->channels; c++) {
     drifts += drift[c];
@@ -220,7 +221,7 @@ static void give(const clt_far *far, clt_live_item *item) {
 
 /* After the drive was changed otherwise than by a step. */
 static void give_again(clt_far *far) {
-#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE)
+#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE) if (far->shared)
   for (size_t k = 0; k < far->items; k++) {
     give(far, &far->item[k]);
   }
@@ -244,7 +245,7 @@ static bool step(clt_far *far, bool renew) {
       return false;
     }
   }
-#pragma omp parallel
+#pragma omp parallel if (far->shared)
   {
     clt_newton_step(far);
 #pragma omp for schedule(dynamic, ITEMS_AT_ONCE)

@@ -11,7 +11,7 @@
 enum {
   TERMS = CLT_LEAF_TERMS,
   COUPLED_LEAST = 64, /* columns, whose factor costs next to nothing */
-  CHUNKS = 8          /* of leaves, so that sums do not depend on the number of threads */
+  CHUNKS = CLT_HIERARCHY_CHUNKS
 };
 /* Of a cell's own light: far light of smaller singular values is not coupled. */
 static const float COUPLED = 0.05f;
@@ -68,7 +68,7 @@ static void weigh_factor(const clt_far *far, int channel, int weight, const floa
                          float *tall) {
   const clt_live_item *item = items_of(far, channel);
   const size_t rank = far->rank;
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (far->shared)
   for (size_t leaf = 0; leaf < leaves_of(far); leaf++) {
     const float *moment = item[leaf].weight[weight], *from = factor + TERMS * leaf * rank;
     for (size_t s = 0; s < TERMS; s++) {
@@ -93,7 +93,7 @@ static void weigh_product(const clt_far *far, int channel, int weight, const flo
 
 static void weigh_items(const clt_far *far, int channel) {
   clt_live_item *item = items_of(far, channel);
-#pragma omp parallel for schedule(dynamic, 8)
+#pragma omp parallel for schedule(dynamic, 8) if (far->shared)
   for (size_t k = 0; k < leaves_of(far); k++) {
     far->kernels->weigh(far, &item[k]);
   }
@@ -218,6 +218,16 @@ static float *partial_of(const clt_far *far, int channel, size_t chunk) {
   return far->partial + ((size_t)channel * CHUNKS + chunk) * 2 * far->rank;
 }
 
+/* partial = factor' of what the items hold at `offset`, of every channel and chunk: factor is left or right, whole. */
+static void sum_items(const clt_far *far, const float *factor, size_t offset) {
+#pragma omp for schedule(dynamic, 1)
+  for (int k = 0; k < far->channels * CHUNKS; k++) {
+    const size_t chunk = (size_t)(k % CHUNKS);
+    sum_chunk(far, k / CHUNKS, chunk, factor_of(far, factor, k / CHUNKS), far->rank, offset,
+              partial_of(far, k / CHUNKS, chunk));
+  }
+}
+
 /* out = the sum of a channel's partial sums, from `first` on. */
 static void fold_chunks(const clt_far *far, int channel, size_t first, size_t count, float *out) {
   memset(out, 0, count * sizeof *out);
@@ -288,12 +298,7 @@ void clt_newton_turn(const clt_far *far, clt_live_item *item) {
 }
 
 void clt_newton_gather(clt_far *far) {
-#pragma omp for schedule(dynamic, 1)
-  for (int k = 0; k < far->channels * CHUNKS; k++) {
-    const size_t chunk = (size_t)(k % CHUNKS);
-    sum_chunk(far, k / CHUNKS, chunk, right_of(far, k / CHUNKS), far->rank, offsetof(clt_live_item, given),
-              partial_of(far, k / CHUNKS, chunk));
-  }
+  sum_items(far, far->hierarchy->right, offsetof(clt_live_item, given));
 #pragma omp for schedule(dynamic, 1)
   for (int channel = 0; channel < far->channels; channel++) {
     double light = 0;
@@ -331,12 +336,7 @@ static double drift_of(clt_far *far, int channel) {
 }
 
 void clt_newton_drift(clt_far *far, double drift[CLT_CHANNELS_MAX]) {
-#pragma omp for schedule(dynamic, 1)
-  for (int k = 0; k < far->channels * CHUNKS; k++) {
-    const size_t chunk = (size_t)(k % CHUNKS);
-    sum_chunk(far, k / CHUNKS, chunk, left_of(far, k / CHUNKS), far->rank, offsetof(clt_live_item, whole),
-              partial_of(far, k / CHUNKS, chunk));
-  }
+  sum_items(far, far->hierarchy->left, offsetof(clt_live_item, whole));
 #pragma omp for schedule(dynamic, 1)
   for (int channel = 0; channel < far->channels; channel++) {
     drift[channel] = drift_of(far, channel);

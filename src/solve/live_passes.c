@@ -6,7 +6,7 @@ enum { ITEMS_AT_ONCE = 8 };
 
 static double time_kernel(clt_far *far, clt_live_pass_name name, float *next) {
   const int64_t since_ns = clt_clock_ns();
-#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE)
+#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE) if (far->shared)
   for (size_t k = 0; k < far->items; k++) {
     clt_live_item *item = &far->item[k];
     if (name == CLT_LIVE_PASS_AIM) {
@@ -24,7 +24,7 @@ static double time_kernel(clt_far *far, clt_live_pass_name name, float *next) {
 
 static double time_gather(clt_far *far) {
   const int64_t since_ns = clt_clock_ns();
-#pragma omp parallel
+#pragma omp parallel if (far->shared)
   clt_newton_gather(far);
   return clt_clock_since(since_ns);
 }

@@ -107,49 +107,53 @@ static void write_factor(const factors *of, const double *q, bool left, size_t k
   }
 }
 
-static clt_status compress_all(clt_hierarchy_storage *own, size_t channels, const double *tolerance, factors *of,
-                               clt_error *error) {
-  const size_t whole = of->nodes * of->rank;
-  float *made = clt_alloc(2 * channels * whole, sizeof *made);
-  double *room = clt_alloc(whole, sizeof *room);
-  clt_status status = made != NULL && room != NULL
-                          ? CLT_OK
-                          : clt_fail(error, CLT_FAILED, "no memory to compress far light of rank %zu", of->rank);
-  size_t kept = 1;
-  for (int pass = 0; pass < 2 && status == CLT_OK; pass++) { /* the channels share the largest rank of any */
-    for (size_t c = 0; c < channels && status == CLT_OK; c++) {
-      if (!decompose(of, own->left + c * whole, own->right + c * whole)) {
-        status = clt_fail(error, CLT_FAILED, "far light of rank %zu has no singular values", of->rank);
-      } else if (pass == 0) {
-        const size_t needed = rank_needed(of, tolerance[c]);
-        kept = needed > kept ? needed : kept;
-      } else {
-        write_factor(of, of->left, true, kept, room, made + c * of->nodes * kept);
-        write_factor(of, of->right, false, kept, room, made + (channels + c) * of->nodes * kept);
-      }
-    }
+/* The channels share the largest rank of any. */
+static clt_status write_all(clt_hierarchy_storage *own, size_t channels, size_t kept, const factors *of,
+                            clt_error *error) {
+  const size_t each = of->nodes * kept;
+  float *made = clt_alloc(2 * channels * each, sizeof *made);
+  double *room = clt_alloc(each, sizeof *room);
+  if (made == NULL || room == NULL) {
+    free(made);
+    free(room);
+    return clt_fail(error, CLT_FAILED, "no memory to compress far light of rank %zu", of->rank);
   }
-  if (status == CLT_OK) {
-    memcpy(own->left, made, channels * of->nodes * kept * sizeof *made);
-    memcpy(own->right, made + channels * of->nodes * kept, channels * of->nodes * kept * sizeof *made);
-    own->rank = kept;
+  for (size_t c = 0; c < channels; c++) {
+    write_factor(&of[c], of[c].left, true, kept, room, made + c * each);
+    write_factor(&of[c], of[c].right, false, kept, room, made + (channels + c) * each);
   }
+  memcpy(own->left, made, channels * each * sizeof *made);
+  memcpy(own->right, made + channels * each, channels * each * sizeof *made);
+  own->rank = kept;
   free(made);
   free(room);
-  return status;
+  return CLT_OK;
 }
 
 clt_status clt_leaves_compress(clt_hierarchy_storage *own, size_t channels, const double *tolerance, clt_error *error) {
-  factors of;
-  if (CLT_LEAF_TERMS * own->leaves < own->rank) {
+  factors of[CLT_CHANNELS_MAX] = {{0}};
+  const size_t nodes = CLT_LEAF_TERMS * own->leaves, rank = own->rank, whole = nodes * rank;
+  size_t kept = 1;
+  if (nodes < rank) {
     return CLT_OK;
   }
-  clt_status status = reserve(&of, CLT_LEAF_TERMS * own->leaves, own->rank, error);
-  if (status != CLT_OK) {
-    return status;
+  clt_status status = CLT_OK;
+  for (size_t c = 0; c < channels && status == CLT_OK; c++) {
+    status = reserve(&of[c], nodes, rank, error);
+    if (status == CLT_OK) {
+      weigh(own, of[c].weight);
+      status = decompose(&of[c], own->left + c * whole, own->right + c * whole)
+                   ? CLT_OK
+                   : clt_fail(error, CLT_FAILED, "far light of rank %zu has no singular values", rank);
+    }
+    const size_t needed = status == CLT_OK ? rank_needed(&of[c], tolerance[c]) : 1;
+    kept = needed > kept ? needed : kept;
   }
-  weigh(own, of.weight);
-  status = compress_all(own, channels, tolerance, &of, error);
-  release(&of);
+  if (status == CLT_OK) {
+    status = write_all(own, channels, kept, of, error);
+  }
+  for (size_t c = 0; c < channels; c++) {
+    release(&of[c]);
+  }
   return status;
 }

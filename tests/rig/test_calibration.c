@@ -209,7 +209,7 @@ static void check_rig(const rough_room *room, const clt_calibration *calibration
   double off = 0, whole = 0;
   clt_scene_rig_config(room->scene, &config);
   clt_calibration_apply(calibration, &config);
-  config.verify = true; /* the station's default: exposures of cells with unlike pixels must not seem to contradict */
+  config.verify = true; /* exposures of cells with unlike pixels must not seem to contradict */
   assert_ok(clt_rig_open(&config, room->projector, room->camera, &rig, &error), error);
   for (int k = 0; k < 3; k++) {
     assert_ok(clt_image_init(images[k], 3, GRID_HEIGHT, GRID_WIDTH, &error), error);
