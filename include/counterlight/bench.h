@@ -24,9 +24,10 @@ typedef struct clt_bench_frame {
   size_t cells;
   int channels;
   double cold_ms;                   /* from a drive of 0, median */
-  double p50_ms, p99_ms;            /* warm: a picture that moves from frame to frame */
+  double p50_ms, p99_ms;            /* warm: a picture that moves from frame to frame, with a cut every 40 */
   double stage_ms[CLT_LIVE_STAGES]; /* medians */
   double error, residual;           /* the worst of any frame: the estimate, and of T as stored */
+  double clipped;                   /* the most of any frame: lit cells at 0 or 1 */
   int steps;                        /* the most of any frame */
 } clt_bench_frame;
 
@@ -46,7 +47,8 @@ typedef struct clt_bench_report {
   double bandwidth_gbs;
   int kernel_count, peer_count, point_count;
   clt_bench_kernel kernel[CLT_BENCH_KERNELS];
-  clt_bench_frame frame;
+  clt_bench_frame frame; /* of pictures that T can show */
+  clt_bench_frame held;  /* of pictures with more contrast than that: many cells end at 0 or 1 */
   clt_bench_peer peer[CLT_BENCH_PEERS];
   double exponent; /* of ms over cells, by least squares of the logarithms */
   clt_bench_point point[CLT_BENCH_POINTS];

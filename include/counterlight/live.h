@@ -2,7 +2,11 @@
  *
  * A live solver is made once for a transport. It holds the transport in "hierarchy" storage (made where it is held
  * otherwise), what is known of its inverse, and all its workspace: a frame allocates nothing. Frames begin from what
- * the last one ended with. Vectors are float, channel after channel, cells in row-major order. */
+ * the last one ended with. Vectors are float, channel after channel, cells in row-major order.
+ *
+ * Frames share their work among OpenMP's threads and call BLAS in each of them: a program that shows moving pictures
+ * gives BLAS one thread of its own (openblas_set_num_threads(1)), or the two fight for the processors and a frame takes
+ * up to four times as long. */
 #ifndef COUNTERLIGHT_LIVE_H
 #define COUNTERLIGHT_LIVE_H
 

@@ -29,9 +29,10 @@ static json_t *kernels_json(const clt_bench_report *report) {
 }
 
 static json_t *frame_json(const clt_bench_frame *frame) {
-  return json_pack("{s:I, s:i, s:f, s:f, s:f, s:f, s:f, s:i, s:{s:f, s:f, s:f}}", "cells", (json_int_t)frame->cells,
-                   "channels", frame->channels, "p50_ms", frame->p50_ms, "p99_ms", frame->p99_ms, "error", frame->error,
-                   "residual", frame->residual, "cold_ms", frame->cold_ms, "steps", frame->steps, "stage_ms", "prepare",
+  return json_pack("{s:I, s:i, s:f, s:f, s:f, s:f, s:f, s:f, s:i, s:{s:f, s:f, s:f}}", "cells",
+                   (json_int_t)frame->cells, "channels", frame->channels, "p50_ms", frame->p50_ms, "p99_ms",
+                   frame->p99_ms, "error", frame->error, "residual", frame->residual, "clipped", frame->clipped,
+                   "cold_ms", frame->cold_ms, "steps", frame->steps, "stage_ms", "prepare",
                    frame->stage_ms[CLT_LIVE_PREPARE], "solve", frame->stage_ms[CLT_LIVE_SOLVE], "estimate",
                    frame->stage_ms[CLT_LIVE_ESTIMATE]);
 }
@@ -65,19 +66,24 @@ static void print_peer(const clt_bench_peer *peer) {
   printf("\n");
 }
 
+static void print_frame(const char *name, const clt_bench_frame *frame) {
+  printf("%-11s %zu cells x %d: %.2f ms (median), %.2f ms (99 %%), %.2f ms from nothing, at most %d steps\n", name,
+         frame->cells, frame->channels, frame->p50_ms, frame->p99_ms, frame->cold_ms, frame->steps);
+  printf("            prepare %.2f, solve %.2f, estimate %.2f ms; residual %.2f %%, estimated error %.2f %%",
+         frame->stage_ms[CLT_LIVE_PREPARE], frame->stage_ms[CLT_LIVE_SOLVE], frame->stage_ms[CLT_LIVE_ESTIMATE],
+         100 * frame->residual, 100 * frame->error);
+  printf(", %.0f %% of cells at 0 or 1\n", 100 * frame->clipped);
+}
+
 static void print_report(const clt_bench_report *report) {
-  const clt_bench_frame *frame = &report->frame;
   printf("memory      %.1f GB/s read\n", report->bandwidth_gbs);
   for (int k = 0; k < report->kernel_count; k++) {
     const clt_bench_kernel *kernel = &report->kernel[k];
     printf("%-22s %8.1f MB %9.3f ms %4.0f %% of the read\n", kernel->name, 1e-6 * kernel->bytes, kernel->ms,
            100 * kernel->fraction);
   }
-  printf("frames      %zu cells x %d: %.2f ms (median), %.2f ms (99 %%), %.2f ms from nothing, at most %d steps\n",
-         frame->cells, frame->channels, frame->p50_ms, frame->p99_ms, frame->cold_ms, frame->steps);
-  printf("            prepare %.2f, solve %.2f, estimate %.2f ms; residual %.2f %%, estimated error %.2f %%\n",
-         frame->stage_ms[CLT_LIVE_PREPARE], frame->stage_ms[CLT_LIVE_SOLVE], frame->stage_ms[CLT_LIVE_ESTIMATE],
-         100 * frame->residual, 100 * frame->error);
+  print_frame("frames", &report->frame);
+  print_frame("frames held", &report->held);
   for (int k = 0; k < report->peer_count; k++) {
     print_peer(&report->peer[k]);
   }
@@ -91,9 +97,10 @@ static void print_report(const clt_bench_report *report) {
 
 static int answer(const cli_arguments *arguments, const clt_bench_report *report) {
   if (arguments->json) {
-    return cli_print_json(json_pack("{s:f, s:o, s:o, s:o, s:o}", "bandwidth_gbs", report->bandwidth_gbs, "kernels",
-                                    kernels_json(report), "frame", frame_json(&report->frame), "peers",
-                                    peers_json(report), "scaling", scaling_json(report)));
+    return cli_print_json(json_pack("{s:f, s:o, s:o, s:o, s:o, s:o}", "bandwidth_gbs", report->bandwidth_gbs, "kernels",
+                                    kernels_json(report), "frame", frame_json(&report->frame), "held",
+                                    frame_json(&report->held), "peers", peers_json(report), "scaling",
+                                    scaling_json(report)));
   }
   if (!arguments->quiet) {
     print_report(report);

@@ -1,4 +1,5 @@
 /* counterlightd: keeps a compensated picture on a projector, unattended. */
+#include <cblas.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
@@ -125,6 +126,7 @@ static void block_signals(void) {
 static int serve(const daemon_config *config, const daemon_overrides *overrides) {
   daemon_parts parts = {.listening.descriptor = -1, .state.lock = -1, .boxes.wake = -1};
   clt_error error = {0};
+  openblas_set_num_threads(1); /* counterlight/live.h */
   clt_status status = open_parts(config, overrides, &parts, &error);
   status = status == CLT_OK ? run_threads(&parts, &error) : status;
   if (status != CLT_OK && parts.controlling != NULL) {

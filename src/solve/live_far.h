@@ -57,6 +57,7 @@ typedef struct clt_live_item {
   float given[CLT_LEAF_TERMS];                       /* P' diag(v) x */
   float held[CLT_LEAF_TERMS], known[CLT_LEAF_TERMS]; /* sums of 1, u, v, u v over held cells: now, and in the factor */
   float weight[3][CLT_LIVE_MOMENTS];                 /* of v k / D and (v / D)^2 where free, k^2 where held */
+  float counted[3][CLT_LIVE_MOMENTS];                /* of these: what the products of the factor know */
   double residual, gap, wanted, seen, light;         /* ||r||^2, ||D s||^2, ||b||^2, ||b - r||^2, the sum of x */
 } clt_live_item;
 
@@ -111,8 +112,10 @@ struct clt_far {
   float *factor;                    /* per channel: two, of twice as many columns as the most that are coupled */
   size_t order;                     /* that many */
   int *pivots;                      /* of both factors: where no cell is held, and where some are */
-  float *partial;                   /* channels x CLT_HIERARCHY_CHUNKS x 2R */
-  float *tall;                      /* 4L x R: room for the products that make a factor */
+  float *product;                   /* per channel: G, H and N as they were counted last */
+  unsigned counts[CLT_CHANNELS_MAX];
+  float *partial; /* channels x CLT_HIERARCHY_CHUNKS x 2R */
+  float *tall;    /* room for bringing these up to date */
 };
 
 extern const clt_live_kernels *const clt_live_variants[];
@@ -124,8 +127,6 @@ clt_status clt_live_pack(clt_far *far, const float *inverse, clt_error *error);
 /* Room for the small systems of every channel, and how much of the rank the factor couples. */
 clt_status clt_newton_create(clt_far *far, clt_error *error);
 void clt_newton_destroy(clt_far *far);
-/* Takes the factor of a channel from what its items hold; false where it is singular. That of no held cell is known. */
-bool clt_newton_factor(clt_far *far, int channel);
 /* The rest is called by every thread of a team, which shares the work. */
 /* dz and q of every channel from what the items give and take. */
 void clt_newton_step(clt_far *far);

@@ -6,7 +6,7 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
-#include "solve/live_far.h"
+#include "solve/live_factor.h"
 
 enum { STEPS_MAX = 40, STALE_STEPS = 5, ITEMS_AT_ONCE = 8, WORTH_SHARING = 16384 /* values */ };
 static const double WORSE = 1.001; /* of the least objective: above it a step has gone too far */
@@ -177,9 +177,9 @@ static bool is_near(clt_far *far, const frame *at, double enough, clt_live_resul
   return sqrt(at->gap) + sqrt(drifts) <= enough;
 }
 
-/* Takes the factor of a channel anew where other cells are held than it knows of: by leaves, for it knows no cells.
- * That of no held cell is always there. */
-static bool keep_factor(clt_far *far, int channel, bool renew) {
+/* Whether the factor of a channel is to be taken anew, because other cells are held than it knows of: by leaves, for it
+ * knows no cells. That of no held cell is always there. */
+static bool has_aged(clt_far *far, int channel, bool renew) {
   const size_t leaves = far->hierarchy->leaves, first = (size_t)channel * leaves;
   double changed = 0, held = 0;
   for (size_t k = first; k < first + leaves; k++) {
@@ -193,9 +193,17 @@ static bool keep_factor(clt_far *far, int channel, bool renew) {
   }
   far->bound[channel] = held > 0;
   far->pulled[channel] = far->pulled[channel] || held > 0;
-  return held == 0 ||
-         (far->ready[channel] && (changed == 0 || (!renew && changed <= MOVED * (double)far->lit[channel]))) ||
-         clt_newton_factor(far, channel);
+  return held > 0 &&
+         !(far->ready[channel] && (changed == 0 || (!renew && changed <= MOVED * (double)far->lit[channel])));
+}
+
+static bool keep_factors(clt_far *far, bool renew) {
+  bool aged[CLT_CHANNELS_MAX] = {false}, any = false;
+  for (int c = 0; c < far->channels; c++) {
+    aged[c] = has_aged(far, c, renew);
+    any = any || aged[c];
+  }
+  return !any || clt_factor_renew(far, aged);
 }
 
 /* What the drive gives over an item, as `move` leaves it. */
@@ -240,10 +248,8 @@ static void halve(const clt_live *live, clt_far *far) {
 /* One Newton step of every channel, into the drive that is neither the last nor the best. */
 static bool step(clt_far *far, bool renew) {
   const int next = far->now != 0 && far->best != 0 ? 0 : far->now != 1 && far->best != 1 ? 1 : 2;
-  for (int c = 0; c < far->channels; c++) {
-    if (!keep_factor(far, c, renew)) {
-      return false;
-    }
+  if (!keep_factors(far, renew)) {
+    return false;
   }
 #pragma omp parallel if (far->shared)
   {

@@ -1,20 +1,12 @@
-/* The small systems of a Newton step. */
-#include <cblas.h>
-#include <lapacke.h>
+/* Steps of Newton's method between the light that leaves give and the light that they take. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/memory.h"
-#include "solve/live_far.h"
+#include "solve/live_factor.h"
 
-enum {
-  TERMS = CLT_LEAF_TERMS,
-  COUPLED_LEAST = 64, /* columns, whose factor costs next to nothing */
-  CHUNKS = CLT_HIERARCHY_CHUNKS
-};
-/* Of a cell's own light: far light of smaller singular values is not coupled. */
-static const float COUPLED = 0.05f;
+enum { TERMS = CLT_LEAF_TERMS, CHUNKS = CLT_HIERARCHY_CHUNKS };
 
 static size_t leaves_of(const clt_far *far) {
   return far->hierarchy->leaves;
@@ -40,11 +32,10 @@ static float *of_channel(float *all, size_t each, int channel) {
   return all + (size_t)channel * each;
 }
 
-static clt_status reserve(clt_far *far, clt_error *error) {
+clt_status clt_newton_create(clt_far *far, clt_error *error) {
   const size_t rank = far->rank, channels = (size_t)far->channels;
   far->small = clt_alloc(channels * rank, (4 + 2 * CHUNKS + rank) * sizeof *far->small);
-  far->tall = clt_alloc(TERMS * leaves_of(far) * rank, sizeof *far->tall);
-  if (far->small == NULL || far->tall == NULL) {
+  if (far->small == NULL) {
     return clt_fail(error, CLT_FAILED, "no memory for steps over far light of rank %zu", rank);
   }
   far->z = far->small;
@@ -52,152 +43,12 @@ static clt_status reserve(clt_far *far, clt_error *error) {
   far->right = far->q + channels * rank;
   far->partial = far->right + channels * 2 * rank;
   far->gram = far->partial + channels * CHUNKS * 2 * rank;
-  return CLT_OK;
+  return clt_factor_create(far, error);
 }
 
 void clt_newton_destroy(clt_far *far) {
+  clt_factor_destroy(far);
   free(far->small);
-  free(far->factor);
-  free(far->pivots);
-  free(far->tall);
-}
-
-/* tall = M factor, M the moments of one weight over every leaf: the entry of the terms u^a v^b and u^c v^d is the
- * moment of u^(a+c) v^(b+d). Only the first columns of the factor are taken. */
-static void weigh_factor(const clt_far *far, int channel, int weight, const float *factor, size_t columns,
-                         float *tall) {
-  const clt_live_item *item = items_of(far, channel);
-  const size_t rank = far->rank;
-#pragma omp parallel for schedule(static) if (far->shared)
-  for (size_t leaf = 0; leaf < leaves_of(far); leaf++) {
-    const float *moment = item[leaf].weight[weight], *from = factor + TERMS * leaf * rank;
-    for (size_t s = 0; s < TERMS; s++) {
-      float *to = tall + (TERMS * leaf + s) * columns;
-      const float m0 = moment[3 * (s / 2) + s % 2], m1 = moment[3 * (s / 2) + s % 2 + 1];
-      const float m2 = moment[3 * (s / 2 + 1) + s % 2], m3 = moment[3 * (s / 2 + 1) + s % 2 + 1];
-      for (size_t r = 0; r < columns; r++) {
-        to[r] = (m0 * from[r] + m1 * from[rank + r]) + (m2 * from[2 * rank + r] + m3 * from[3 * rank + r]);
-      }
-    }
-  }
-}
-
-/* block = factor' M other over the first columns, column-major with `stride` between columns. */
-static void weigh_product(const clt_far *far, int channel, int weight, const float *factor, const float *other,
-                          size_t columns, float sign, float *block, size_t stride) {
-  const blasint count = (blasint)columns, nodes = (blasint)(TERMS * leaves_of(far));
-  weigh_factor(far, channel, weight, other, columns, far->tall);
-  cblas_sgemm(CblasColMajor, CblasNoTrans, CblasTrans, count, count, nodes, sign, factor, (blasint)far->rank, far->tall,
-              count, 0, block, (blasint)stride);
-}
-
-static void weigh_items(const clt_far *far, int channel) {
-  clt_live_item *item = items_of(far, channel);
-#pragma omp parallel for schedule(dynamic, 8) if (far->shared)
-  for (size_t k = 0; k < leaves_of(far); k++) {
-    far->kernels->weigh(far, &item[k]);
-  }
-}
-
-/* squares_r = factor_r' M factor_r, M the moments of v k / D. */
-static void measure_columns(const clt_far *far, int channel, const float *factor, double *squares) {
-  const size_t rank = far->rank;
-  weigh_factor(far, channel, 0, factor, rank, far->tall);
-  memset(squares, 0, rank * sizeof *squares);
-  for (size_t m = 0; m < TERMS * leaves_of(far); m++) {
-    for (size_t r = 0; r < rank; r++) {
-      squares[r] += (double)factor[m * rank + r] * (double)far->tall[m * rank + r];
-    }
-  }
-}
-
-/* What is known of a channel where no cell is held: V' D^-2 V, and how many columns of far light are coupled, all up
- * to the last that is not small. */
-static clt_status prepare_channel(clt_far *far, int channel, clt_error *error) {
-  const size_t rank = far->rank;
-  double *left = clt_alloc(2 * rank, sizeof *left), *right = left + rank;
-  if (left == NULL) {
-    return clt_fail(error, CLT_FAILED, "no memory for far light of rank %zu", rank);
-  }
-  weigh_items(far, channel);
-  weigh_product(far, channel, 1, right_of(far, channel), right_of(far, channel), rank, 1,
-                of_channel(far->gram, rank * rank, channel), rank);
-  measure_columns(far, channel, left_of(far, channel), left);
-  measure_columns(far, channel, right_of(far, channel), right);
-  far->coupled[channel] = rank < COUPLED_LEAST ? rank : COUPLED_LEAST;
-  for (size_t r = 0; r < rank; r++) {
-    if (r >= far->coupled[channel] && left[r] * right[r] > (double)COUPLED * (double)COUPLED) {
-      far->coupled[channel] = r + 1;
-    }
-  }
-  free(left);
-  return CLT_OK;
-}
-
-/* The factor of a channel that serves now, and its pivots. */
-static float *factor_now(const clt_far *far, int channel) {
-  return far->factor + (2 * (size_t)channel + far->bound[channel]) * far->order * far->order;
-}
-
-static int *pivots_now(const clt_far *far, int channel) {
-  return far->pivots + (2 * (size_t)channel + far->bound[channel]) * far->order;
-}
-
-static clt_status factor_free(clt_far *far, clt_error *error) {
-  const size_t channels = (size_t)far->channels;
-  for (int c = 0; c < far->channels; c++) {
-    far->order = 2 * far->coupled[c] > far->order ? 2 * far->coupled[c] : far->order;
-  }
-  far->factor = clt_alloc(2 * channels * far->order, far->order * sizeof *far->factor);
-  far->pivots = clt_alloc(2 * channels, far->order * sizeof *far->pivots);
-  if (far->factor == NULL || far->pivots == NULL) {
-    return clt_fail(error, CLT_FAILED, "no memory for factors of far light of rank %zu", far->rank);
-  }
-  for (int c = 0; c < far->channels; c++) {
-    if (!clt_newton_factor(far, c)) {
-      return clt_fail(error, CLT_FAILED, "far light of rank %zu has a singular factor", far->rank);
-    }
-    far->ready[c] = false;
-  }
-  return CLT_OK;
-}
-
-clt_status clt_newton_create(clt_far *far, clt_error *error) {
-  clt_status status = reserve(far, error);
-  far->open = true;
-  for (int c = 0; status == CLT_OK && c < far->channels; c++) {
-    status = prepare_channel(far, c, error);
-  }
-  if (status == CLT_OK) {
-    status = factor_free(far, error);
-  }
-  far->open = false;
-  return status;
-}
-
-/* The matrix above, of the columns that are coupled. */
-bool clt_newton_factor(clt_far *far, int channel) {
-  const size_t count = far->coupled[channel], order = 2 * count;
-  const float *left = left_of(far, channel), *right = right_of(far, channel);
-  float *matrix = factor_now(far, channel);
-  weigh_items(far, channel);
-  weigh_product(far, channel, 0, right, left, count, 1, matrix, order); /* G */
-  for (size_t j = 0; j < count; j++) {
-    for (size_t i = 0; i < count; i++) {
-      matrix[(count + i) * order + count + j] = matrix[j * order + i] + (i == j ? 1.0f : 0.0f);
-    }
-  }
-  for (size_t j = 0; j < count; j++) {
-    matrix[j * order + j] += 1;
-  }
-  weigh_product(far, channel, 1, right, right, count, -1, matrix + count * order, order); /* -H */
-  weigh_product(far, channel, 2, left, left, count, 1, matrix + count, order);            /* N */
-  for (clt_live_item *item = items_of(far, channel); item < items_of(far, channel) + leaves_of(far); item++) {
-    memcpy(item->known, item->held, sizeof item->known);
-  }
-  far->ready[channel] = LAPACKE_sgetrf_work(LAPACK_COL_MAJOR, (lapack_int)order, (lapack_int)order, matrix,
-                                            (lapack_int)order, pivots_now(far, channel)) == 0;
-  return far->ready[channel];
 }
 
 /* partial = factor' of what the items of a chunk hold at `offset`, over the first columns. */
@@ -241,7 +92,7 @@ static void fold_chunks(const clt_far *far, int channel, size_t first, size_t co
 
 /* Right sides into answers: dz stays in far->right, dq goes into q. */
 static void solve_channel(clt_far *far, int channel) {
-  const size_t rank = far->rank, count = far->coupled[channel], order = 2 * count;
+  const size_t rank = far->rank, count = far->coupled[channel];
   float *answer = of_channel(far->right, 2 * rank, channel), *q = of_channel(far->q, rank, channel);
   float *taken = answer + count;
   fold_chunks(far, channel, 0, count, answer);
@@ -254,8 +105,7 @@ static void solve_channel(clt_far *far, int channel) {
   } else {
     memset(taken, 0, count * sizeof *taken);
   }
-  LAPACKE_sgetrs_work(LAPACK_COL_MAJOR, 'N', (lapack_int)order, 1, factor_now(far, channel), (lapack_int)order,
-                      pivots_now(far, channel), answer, (lapack_int)order);
+  clt_factor_solve(far, channel, answer);
   far->pulled[channel] = far->bound[channel];
   if (far->bound[channel]) {
     for (size_t r = 0; r < count; r++) {

@@ -51,6 +51,8 @@ static void test_report(void **unused) {
   assert_int_equal(report.frame.cells, CELLS);
   assert_true(report.frame.p50_ms > 0 && report.frame.p50_ms <= report.frame.p99_ms);
   assert_true(report.frame.residual <= options.target_error && report.frame.error >= report.frame.residual);
+  assert_true(report.frame.clipped == 0 && report.held.clipped > 0.1 && report.held.residual > report.frame.residual);
+  assert_true(report.held.p50_ms > 0 && report.held.p50_ms <= report.held.p99_ms && report.held.steps > 1);
   assert_int_equal(report.peer_count, 3);
   assert_string_equal(report.peer[0].name, "report-jacobi-csr-f32");
   assert_true(report.peer[0].error <= options.target_error && report.peer[0].entries >= 128);

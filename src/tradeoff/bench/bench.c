@@ -27,7 +27,7 @@ static clt_status measure_point(int width, int height, const clt_bench_options *
     status = clt_certify(room, &certificate, error);
   }
   if (status == CLT_OK) {
-    status = clt_bench_frames(room, certificate, &brief, &frame, error);
+    status = clt_bench_frames(room, certificate, &brief, CLT_BENCH_WITHIN, &frame, error);
   }
   if (status == CLT_OK) {
     *point = (clt_bench_point){(double)width * height, frame.p50_ms};
@@ -76,7 +76,8 @@ static clt_status run_method(method_run *own, const clt_transport *transport, cl
     const bool warm = k >= CLT_BENCH_TURNS;
     clt_solve_result result;
     memcpy(own->start, own->drive, (size_t)info.channels * info.cols * sizeof *own->start);
-    clt_bench_picture(transport, warm ? k + 1 - CLT_BENCH_TURNS : 0, own->drive, own->wanted, own->target);
+    clt_bench_picture(transport, warm ? k + 1 - CLT_BENCH_TURNS : 0, CLT_BENCH_WITHIN, own->drive, own->wanted,
+                      own->target);
     status = clt_solver_run(own->solver, own->wanted, warm ? own->start : NULL, own->drive, &result, error);
     ms[warm][k % CLT_BENCH_TURNS] = 1e3 * result.seconds;
     peer->error = warm ? peer->error : result.residual;
@@ -139,7 +140,10 @@ clt_status clt_bench(const clt_transport *transport, const clt_bench_options *op
     status = clt_bench_kernels(transport, certificate, report, error);
   }
   if (status == CLT_OK) {
-    status = clt_bench_frames(transport, certificate, &asked, &report->frame, error);
+    status = clt_bench_frames(transport, certificate, &asked, CLT_BENCH_WITHIN, &report->frame, error);
+  }
+  if (status == CLT_OK) {
+    status = clt_bench_frames(transport, certificate, &asked, CLT_BENCH_BEYOND, &report->held, error);
   }
   if (status == CLT_OK) {
     status = measure_peers(transport, certificate, &asked, report, error);

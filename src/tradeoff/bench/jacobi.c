@@ -142,7 +142,7 @@ static double iterate(rows *own) {
 /* Fills what is wanted of a frame; returns its norm. */
 static double want(rows *own, const clt_transport *transport, int number) {
   double sum = 0;
-  clt_bench_picture(transport, number, own->x, own->y, own->target);
+  clt_bench_picture(transport, number, CLT_BENCH_WITHIN, own->x, own->y, own->target);
   for (size_t at = 0; at < (size_t)own->channels * own->cells; at++) {
     own->wanted[at] = (float)own->y[at];
     sum += own->y[at] * own->y[at];

@@ -109,7 +109,7 @@ static clt_status measure_passes(trial *own, const clt_transport *transport, con
   clt_status status = target != NULL ? clt_live_create(transport, certificate, NULL, &live, error)
                                      : clt_fail(error, CLT_FAILED, "no memory for frames of %zu cells", info.cols);
   for (int turn = 0; status == CLT_OK && has_passes && turn < REPEATS; turn++) {
-    clt_bench_picture(transport, turn, own->x, own->y, target);
+    clt_bench_picture(transport, turn, CLT_BENCH_WITHIN, own->x, own->y, target);
     status = clt_live_solve(live, target, target + values, &result, error);
     has_passes = status == CLT_OK && clt_live_time_passes(live, target, pass);
     for (size_t k = 0; has_passes && k < CLT_LIVE_PASSES; k++) {
