@@ -16,7 +16,7 @@ extern "C" {
 typedef struct clt_progress {
   const char *phase;    /* "black", "flood", "level 3 of 6", "columns", "check" */
   long done, total;     /* patterns; total is an estimate that may grow */
-  long resumed;         /* of those done: taken from the journal */
+  long resumed;         /* of those done: observed before an interruption */
   double seconds, left; /* since the start, and estimated until the end; left < 0 while not known */
 } clt_progress;
 
@@ -30,11 +30,17 @@ typedef struct clt_acquire_options {
   int repeats;        /* observations averaged for black and flood, 1..256; 0 means 8, with "brute" N / 32 if more */
   int checks;         /* random check patterns observed at the end for provenance.error, 0..64 */
   unsigned seed;      /* of the check patterns */
-  const char
-      *journal;   /* NULL, or a file in which every observation is kept as soon as it is made. Where it is there
-                     already, from an acquisition that was interrupted, its observations are taken instead of new
-                     ones as long as the same patterns are asked for. It stays: remove it when the transport is
-                     stored, or the next acquisition gives that one again. CLT_BAD_INPUT where it is another rig's */
+  /* NULL, or a file in which every observation is kept as soon as it is made. Where it is there already, from an
+   * acquisition that was interrupted, its observations are taken instead of new ones as long as the same patterns are
+   * asked for. It stays: remove it when the transport is stored, or the next acquisition gives that one again.
+   * CLT_BAD_INPUT where it is another rig's. What was observed earlier counts only where black, white and a random
+   * picture, photographed again, are as they were; else all begins anew once they were not for patience_s. */
+  const char *journal;
+  const char *journal_of;   /* what a journal belongs to beside its rig, in words; may be NULL */
+  double journal_age_s;     /* a dispensable journal that nothing was added to for longer is begun anew; 0: any age */
+  bool journal_dispensable; /* one of another rig is begun anew as well, and where none can be kept the log says so
+                               and the acquisition goes on. It outlives the process, not a power cut, and is given up
+                               beyond 1 GiB */
   int watch;      /* patterns between two looks, 0..1000000: at what the patterns since the last one show together, and
                      at the white picture. Where the light of the patterns does not add up, or white is not as it was,
                      they are observed again once it is; all cells of a channel brighter or darker by one factor are a

@@ -90,6 +90,11 @@ static void write_provenance(const clt_session *session, const clt_scheme *schem
     snprintf(origin->plan + used, sizeof origin->plan - used,
              "; %ld patterns did not add up: check the camera's response", session->watch.unexplained);
   }
+  if (session->progress.resumed > 0) {
+    const size_t used = strlen(origin->plan);
+    snprintf(origin->plan + used, sizeof origin->plan - used, "; %ld patterns from before an interruption",
+             session->progress.resumed);
+  }
   snprintf(origin->scheme, sizeof origin->scheme, "%s", scheme->name);
   snprintf(origin->source, sizeof origin->source, "%s", now.source != NULL ? now.source : "");
   snprintf(origin->response, sizeof origin->response, "%s", now.response != NULL ? now.response : "");
@@ -98,7 +103,14 @@ static void write_provenance(const clt_session *session, const clt_scheme *schem
 /* One pass, which the watch may break off. */
 static clt_status measure_once(clt_session *session, const clt_scheme *scheme, clt_transport **out, clt_error *error) {
   clt_transport *transport = NULL;
-  clt_status status = measure_black_and_flood(session, error);
+  clt_status status = clt_session_take_landmark(session, error);
+  const bool resumes = session->journal.inherited;
+  if (status == CLT_OK) {
+    status = measure_black_and_flood(session, error);
+  }
+  if (status == CLT_OK && resumes) {
+    status = clt_session_confirm(session, error);
+  }
   if (status == CLT_OK) {
     clt_session_watch(session);
     status = scheme->measure(session, &transport, error);

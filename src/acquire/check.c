@@ -5,10 +5,10 @@
 #include "acquire/session.h"
 #include "base/memory.h"
 
-/* Every value of the drive 0 or 1 by a hash of its number, so that no panel rounds it. */
-static void draw_check(clt_session *session, unsigned check) {
+/* By a hash of each value's number; zeros and ones, so that no panel rounds it. */
+void clt_session_draw(clt_session *session, unsigned number) {
   size_t values = clt_image_size(&session->drive);
-  uint64_t state = ((uint64_t)session->options.seed << 32) + check;
+  uint64_t state = ((uint64_t)session->options.seed << 32) + number;
   for (size_t i = 0; i < values; i++) {
     /* splitmix64: Steele, Lea, Flood 2014 */
     uint64_t z = (state += 0x9e3779b97f4a7c15u);
@@ -73,7 +73,7 @@ clt_status clt_session_check(clt_session *session, const clt_transport *transpor
   double *x = make_workspace(session, error);
   clt_status status = x != NULL ? CLT_OK : CLT_FAILED;
   for (int k = 0; status == CLT_OK && k < session->options.checks; k++) {
-    draw_check(session, (unsigned)k);
+    clt_session_draw(session, (unsigned)k);
     status = clt_session_observe(session, "check", error);
     if (status == CLT_OK) {
       add_miss(session, transport, x, x + session->cells, &sum);

@@ -5,9 +5,14 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
+#include "base/log.h"
+
 static const char magic[16] = "clt-journal-1\n";
+/* What a dispensable one may grow to. */
+static const off_t DISPENSABLE_MOST = (off_t)1 << 30;
 
 typedef struct head {
   char magic[sizeof magic];
@@ -40,10 +45,10 @@ static uint64_t hash_image(uint64_t hash, const clt_image *image) {
   return hash_bytes(hash, image->data, clt_image_size(image) * sizeof *image->data);
 }
 
-static uint64_t hash_rig(const clt_rig_info *info) {
+static uint64_t hash_rig(const clt_rig_info *info, const char *of) {
   const int sizes[] = {info->width, info->height, info->channels};
   uint64_t hash = hash_bytes(HASH_START, sizes, sizeof sizes);
-  const char *const texts[] = {info->source, info->response};
+  const char *const texts[] = {info->source, info->response, of};
   for (size_t k = 0; k < sizeof texts / sizeof texts[0]; k++) {
     hash = texts[k] != NULL ? hash_bytes(hash, texts[k], strlen(texts[k]) + 1) : hash;
   }
@@ -77,41 +82,80 @@ static bool write_whole(int file, const void *bytes, size_t size) {
   return true;
 }
 
-/* A file shorter than a head is one that was killed while it began. */
-static clt_status read_head(clt_journal *journal, const clt_rig_info *info, clt_error *error) {
-  head wanted = {.rig = hash_rig(info)}, found;
-  memcpy(wanted.magic, magic, sizeof magic);
-  if (read_whole(journal->file, &found, sizeof found)) {
-    if (memcmp(found.magic, magic, sizeof magic) != 0) {
-      return clt_fail(error, CLT_BAD_INPUT, "%s: is no journal of an acquisition; give another name", journal->path);
-    }
-    if (found.rig != wanted.rig) {
-      return clt_fail(error, CLT_BAD_INPUT,
-                      "%s: is the journal of another rig, scene or grid; remove it or give another name",
-                      journal->path);
-    }
-    return CLT_OK;
+static clt_status begin(clt_journal *journal, const head *wanted, clt_error *error) {
+  return lseek(journal->file, 0, SEEK_SET) == 0 && ftruncate(journal->file, 0) == 0 &&
+                 write_whole(journal->file, wanted, sizeof *wanted)
+             ? CLT_OK
+             : fail(journal, "could not begin", error);
+}
+
+/* NULL, or why the file is not continued. */
+static const char *find_fault(const head *found, const head *wanted) {
+  if (memcmp(found->magic, wanted->magic, sizeof magic) != 0) {
+    return "is no journal of an acquisition; give another name";
   }
+  return found->rig == wanted->rig ? NULL
+                                   : "is the journal of another rig, scene or grid; remove it or give another name";
+}
+
+/* By the clock of the day, which may have been set: a file of the future is of no known age. */
+static bool is_too_old(const struct stat *file, double most_s) {
+  const double age_s = difftime(time(NULL), file->st_mtime);
+  return most_s > 0 && (age_s > most_s || age_s < -most_s);
+}
+
+/* A file shorter than a head is one that was killed while it began. */
+static clt_status read_head(clt_journal *journal, const clt_acquire_options *options, const clt_rig_info *info,
+                            clt_error *error) {
+  head wanted = {.rig = hash_rig(info, options->journal_of)}, found;
   struct stat file;
-  if (fstat(journal->file, &file) != 0 || file.st_size >= (off_t)sizeof found ||
-      lseek(journal->file, 0, SEEK_SET) != 0 || ftruncate(journal->file, 0) != 0 ||
-      !write_whole(journal->file, &wanted, sizeof wanted)) {
-    return fail(journal, "could not begin", error);
+  memcpy(wanted.magic, magic, sizeof magic);
+  if (fstat(journal->file, &file) != 0) {
+    return fail(journal, "could not open", error);
+  }
+  if (!read_whole(journal->file, &found, sizeof found)) {
+    return file.st_size < (off_t)sizeof found ? begin(journal, &wanted, error) : fail(journal, "could not read", error);
+  }
+  const char *fault = find_fault(&found, &wanted);
+  if (journal->dispensable && (fault != NULL || is_too_old(&file, options->journal_age_s))) {
+    clt_log(CLT_LOG_INFO, "%s: is begun anew: it is %s", journal->path,
+            fault != NULL ? "of another rig or configuration" : "too old");
+    return begin(journal, &wanted, error);
+  }
+  if (fault != NULL) {
+    return clt_fail(error, CLT_BAD_INPUT, "%s: %s", journal->path, fault);
+  }
+  journal->inherited = file.st_size > (off_t)sizeof found;
+  return CLT_OK;
+}
+
+/* A failure of one that can be done without is said and no more. */
+static clt_status do_without(clt_journal *journal, clt_status status, clt_error *error) {
+  if (status == CLT_OK || !journal->dispensable) {
+    return status;
+  }
+  clt_log(CLT_LOG_WARNING, "an acquisition that is interrupted will begin anew: %s", error->message);
+  *error = (clt_error){0};
+  if (journal->file >= 0) {
+    unlink(journal->path);
+    clt_journal_close(journal);
   }
   return CLT_OK;
 }
 
-clt_status clt_journal_open(clt_journal *journal, const char *path, const clt_rig_info *info, clt_error *error) {
-  *journal = (clt_journal){.file = -1, .path = path};
-  if (path == NULL) {
+clt_status clt_journal_open(clt_journal *journal, const clt_acquire_options *options, const clt_rig_info *info,
+                            clt_error *error) {
+  *journal = (clt_journal){.file = -1, .path = options->journal, .dispensable = options->journal_dispensable};
+  if (journal->path == NULL) {
     return CLT_OK;
   }
-  journal->file = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (journal->file < 0) {
-    return fail(journal, "could not open", error);
-  }
+  clt_error problem = {0};
+  journal->file = open(journal->path, O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   journal->replaying = true;
-  return read_head(journal, info, error);
+  clt_status status =
+      journal->file >= 0 ? read_head(journal, options, info, &problem) : fail(journal, "could not open", &problem);
+  status = do_without(journal, status, &problem);
+  return status == CLT_OK ? status : clt_fail(error, status, "%s", problem.message);
 }
 
 clt_status clt_journal_open_unnamed(clt_journal *journal, clt_error *error) {
@@ -151,7 +195,7 @@ clt_status clt_journal_replay(clt_journal *journal, const clt_image *drive, clt_
   if (*found) {
     return CLT_OK;
   }
-  journal->replaying = false;
+  journal->replaying = journal->inherited = false;
   return here >= 0 && lseek(journal->file, here, SEEK_SET) == here && ftruncate(journal->file, here) == 0
              ? CLT_OK
              : fail(journal, "could not continue", error);
@@ -175,20 +219,30 @@ bool clt_journal_next_is(const clt_journal *journal, const clt_image *drive) {
          next.drive == hash_image(HASH_START, drive);
 }
 
+static clt_status add(const clt_journal *journal, const clt_image *drive, const clt_image *seen,
+                      const clt_image *deviation, clt_error *error) {
+  const size_t bytes = clt_image_size(drive) * sizeof *drive->data;
+  const record next = {.drive = hash_image(HASH_START, drive),
+                       .bytes = bytes,
+                       .sum = hash_image(hash_image(HASH_START, seen), deviation)};
+  if (journal->dispensable && clt_journal_here(journal) > DISPENSABLE_MOST) {
+    return clt_fail(error, CLT_FAILED, "the journal %s has grown too large", journal->path);
+  }
+  return write_whole(journal->file, &next, sizeof next) && write_whole(journal->file, seen->data, bytes) &&
+                 write_whole(journal->file, deviation->data, bytes) &&
+                 (journal->unnamed || journal->dispensable || fdatasync(journal->file) == 0)
+             ? CLT_OK
+             : fail(journal, "could not write", error);
+}
+
 clt_status clt_journal_add(clt_journal *journal, const clt_image *drive, const clt_image *seen,
                            const clt_image *deviation, clt_error *error) {
   if (journal->file < 0) {
     return CLT_OK;
   }
-  const size_t bytes = clt_image_size(drive) * sizeof *drive->data;
-  const record next = {.drive = hash_image(HASH_START, drive),
-                       .bytes = bytes,
-                       .sum = hash_image(hash_image(HASH_START, seen), deviation)};
-  return write_whole(journal->file, &next, sizeof next) && write_whole(journal->file, seen->data, bytes) &&
-                 write_whole(journal->file, deviation->data, bytes) &&
-                 (journal->unnamed || fdatasync(journal->file) == 0)
-             ? CLT_OK
-             : fail(journal, "could not write", error);
+  clt_error problem = {0};
+  clt_status status = do_without(journal, add(journal, drive, seen, deviation, &problem), &problem);
+  return status == CLT_OK ? status : clt_fail(error, status, "%s", problem.message);
 }
 
 off_t clt_journal_here(const clt_journal *journal) {
@@ -197,6 +251,7 @@ off_t clt_journal_here(const clt_journal *journal) {
 
 clt_status clt_journal_go_back(clt_journal *journal, off_t start, off_t end, clt_error *error) {
   journal->replaying = true;
+  journal->inherited = false;
   return ftruncate(journal->file, end) == 0 && lseek(journal->file, start, SEEK_SET) == start
              ? CLT_OK
              : fail(journal, "could not go back in", error);

@@ -9,19 +9,22 @@
 #include <stdint.h>
 #include <sys/types.h>
 
+#include "counterlight/acquire.h"
 #include "counterlight/image.h"
-#include "counterlight/rig.h"
-#include "counterlight/status.h"
 
 typedef struct clt_journal {
   int file; /* -1: none is kept */
   bool replaying, unnamed;
+  bool inherited;   /* what is replayed was observed before the journal was opened */
+  bool dispensable; /* without it the acquisition goes on all the same */
   const char *path; /* not owned; of an unnamed one, for messages */
 } clt_journal;
 
-/* Opens or begins the journal at path (NULL: none). It belongs to a rig's source, grid, channels and response:
- * CLT_BAD_INPUT where the file is one of another rig, or no journal. */
-clt_status clt_journal_open(clt_journal *journal, const char *path, const clt_rig_info *info, clt_error *error);
+/* Opens or begins options->journal (NULL: none). It belongs to a rig's source, grid, channels and response and to
+ * options->journal_of: CLT_BAD_INPUT where the file is one of another, or no journal. A dispensable one is then begun
+ * anew, also where it is older than options->journal_age_s, and left out where it cannot be written. */
+clt_status clt_journal_open(clt_journal *journal, const clt_acquire_options *options, const clt_rig_info *info,
+                            clt_error *error);
 /* One without a name, gone when it is closed, to begin an acquisition again from within. */
 clt_status clt_journal_open_unnamed(clt_journal *journal, clt_error *error);
 void clt_journal_close(clt_journal *journal);
@@ -34,7 +37,8 @@ clt_status clt_journal_replay(clt_journal *journal, const clt_image *drive, clt_
 bool clt_journal_is_replaying(const clt_journal *journal);
 /* Whether the record that would be replayed next is of this drive; nothing is taken. */
 bool clt_journal_next_is(const clt_journal *journal, const clt_image *drive);
-/* Appends an observation and brings it to the disk. */
+/* Appends an observation and brings it to the disk; a dispensable one is left to the system to write, which survives
+ * the end of the process, and given up where it cannot be written. */
 clt_status clt_journal_add(clt_journal *journal, const clt_image *drive, const clt_image *seen,
                            const clt_image *deviation, clt_error *error);
 

@@ -5,9 +5,7 @@
 #include "acquire/session.h"
 #include "base/clock.h"
 
-/* Part of its light by which a tile may differ: lamps and mains are not steadier than that. The black picture is mostly
- * the room's own light, which flickers. */
-#define STEADY 0.01
+/* The black picture is mostly the room's own light, which flickers. */
 #define STEADY_BLACK 0.3
 /* Disturbances after which it is no use to begin again. */
 enum { PASSES_MAX = 100 };
@@ -53,6 +51,9 @@ clt_status clt_session_begin_again(clt_session *session, bool *again, clt_error 
   watch->dropped += session->progress.done - watch->good_done;
   watch->unexplained = 0;
   session->progress.done = watch->start_done;
+  if (session->progress.resumed > watch->good_done) {
+    session->progress.resumed = watch->good_done;
+  }
   watch->again = watch->ready = false;
   clt_watch_forget_lamp(watch);
   return session->journal.file >= 0 ? clt_journal_go_back(&session->journal, watch->start, watch->good, error) : CLT_OK;
@@ -103,7 +104,7 @@ static clt_status look_until_same(clt_session *session, int *looks, clt_error *e
       return status;
     }
     clt_change change = clt_watch_compare_lamp(&watch->expected, &watch->variance, &session->black, &session->seen,
-                                               &session->deviation, STEADY, lamp);
+                                               &session->deviation, CLT_STEADY, lamp);
     if (!(change.share > 0)) {
       memcpy(watch->lamp, lamp, (size_t)session->info.channels * sizeof *lamp);
       return CLT_OK;
@@ -158,8 +159,8 @@ static bool shows_same(clt_session *session, const clt_group *earlier, const clt
     session->deviation.data[i] = sqrtf(group->variance.data[i]);
   }
   return clt_group_alike(earlier, group) &&
-         !(clt_watch_compare(&earlier->light, &earlier->variance, &group->light, &session->deviation, STEADY).share >
-           0);
+         !(clt_watch_compare(&earlier->light, &earlier->variance, &group->light, &session->deviation, CLT_STEADY)
+               .share > 0);
 }
 
 /* Patterns that do not add up, and did not the last time with the same light, were not disturbed. Then black was, and
@@ -190,7 +191,7 @@ static clt_status look_at_sum(clt_session *session, clt_error *error) {
   }
   clt_group_expect(group, &session->black, &session->black_variance);
   clt_change change = clt_watch_compare_lamp(&group->light, &group->variance, &session->black, &session->seen,
-                                             &session->deviation, STEADY, lamp);
+                                             &session->deviation, CLT_STEADY, lamp);
   status = change.share > 0 ? judge_group(session, &change, error) : CLT_OK;
   if (status == CLT_OK) {
     clt_group_clear(group);
@@ -245,6 +246,9 @@ static clt_status look_as_before(clt_session *session, bool summed, clt_error *e
 clt_status clt_session_look_before(clt_session *session, bool summed, clt_error *error) {
   clt_watch *watch = &session->watch;
   clt_status status = CLT_OK;
+  if (watch->ready && session->journal.inherited && !clt_journal_is_replaying(&session->journal)) {
+    watch->since = watch->every; /* how bright the lamp is now */
+  }
   if (!watch->ready || watch->since == 0) {
     return CLT_OK;
   }
@@ -262,7 +266,7 @@ clt_status clt_session_look_before(clt_session *session, bool summed, clt_error 
 
 clt_status clt_session_compare_repeat(clt_session *session, int k, clt_error *error) {
   clt_watch *watch = &session->watch;
-  const double tolerance = session->drive.data[0] > 0 ? STEADY : STEADY_BLACK;
+  const double tolerance = session->drive.data[0] > 0 ? CLT_STEADY : STEADY_BLACK;
   size_t values = clt_image_size(&session->seen);
   for (size_t i = 0; k == 0 && i < values; i++) {
     watch->expected.data[i] = session->seen.data[i];

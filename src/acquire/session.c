@@ -25,7 +25,12 @@ clt_status clt_session_init(clt_session *session, clt_rig *rig, const clt_acquir
   for (size_t i = 0; status == CLT_OK && i < sizeof images / sizeof images[0]; i++) {
     status = clt_image_init(images[i], info->channels, info->height, info->width, error);
   }
-  return status == CLT_OK ? clt_journal_open(&session->journal, options->journal, info, error) : status;
+  status = status == CLT_OK ? clt_journal_open(&session->journal, options, info, error) : status;
+  clt_image *const landmark[] = {&session->landmark, &session->landmark_deviation};
+  for (int i = 0; session->journal.file >= 0 && status == CLT_OK && i < 2; i++) {
+    status = clt_image_init(landmark[i], info->channels, info->height, info->width, error);
+  }
+  return status;
 }
 
 clt_status clt_session_begin_watch(clt_session *session, bool kept, clt_error *error) {
@@ -43,6 +48,8 @@ void clt_session_finish(clt_session *session) {
   clt_image_finish(&session->deviation);
   clt_image_finish(&session->black);
   clt_image_finish(&session->black_variance);
+  clt_image_finish(&session->landmark);
+  clt_image_finish(&session->landmark_deviation);
   clt_image_finish(&session->flood);
   clt_image_finish(&session->flood_variance);
 }
@@ -109,9 +116,10 @@ static clt_status observe_patiently(clt_session *session, clt_error *error) {
 static clt_status observe(clt_session *session, clt_error *error) {
   clt_image *drive = &session->drive, *seen = &session->seen, *deviation = &session->deviation;
   bool found = false;
+  const bool inherited = session->journal.inherited;
   clt_status status = clt_journal_replay(&session->journal, drive, seen, deviation, &found, error);
   if (status != CLT_OK || found) {
-    session->progress.resumed += found;
+    session->progress.resumed += found && inherited;
     return status;
   }
   status = observe_patiently(session, error);
@@ -128,9 +136,14 @@ static void note_doubt(clt_session *session) {
   watch->now_s = now.seconds;
 }
 
-clt_status clt_session_take(clt_session *session, const char *phase, clt_error *error) {
+/* Of a pattern that this session showed. */
+static double mean_seconds(const clt_progress *progress) {
+  return progress->seconds / fmax((double)(progress->done - progress->resumed), 1);
+}
+
+/* Counts an observation that was made with this status. */
+static clt_status count(clt_session *session, clt_status status, const char *phase, clt_error *error) {
   clt_progress *progress = &session->progress;
-  clt_status status = observe(session, error);
   if (status == CLT_CANCELLED) {
     return status;
   }
@@ -141,8 +154,16 @@ clt_status clt_session_take(clt_session *session, const char *phase, clt_error *
   progress->done++;
   progress->total = progress->done > progress->total ? progress->done : progress->total;
   progress->seconds = clt_clock_since(session->started_ns);
-  progress->left = progress->seconds / (double)progress->done * (double)(progress->total - progress->done);
+  progress->left = mean_seconds(progress) * (double)(progress->total - progress->done);
   return report(session, phase, error);
+}
+
+clt_status clt_session_take(clt_session *session, const char *phase, clt_error *error) {
+  return count(session, observe(session, error), phase, error);
+}
+
+clt_status clt_session_take_anew(clt_session *session, const char *phase, clt_error *error) {
+  return count(session, observe_patiently(session, error), phase, error);
 }
 
 /* Summed patterns are checked by sums as well. */
@@ -211,6 +232,6 @@ clt_status clt_session_average(clt_session *session, const char *phase, clt_imag
 
 bool clt_session_may_go_on(const clt_session *session) {
   const clt_progress *progress = &session->progress;
-  const double allowed = session->options.seconds, each = progress->seconds / (double)progress->done;
+  const double allowed = session->options.seconds, each = mean_seconds(progress);
   return !(allowed > 0) || progress->seconds + (1 + session->options.checks) * each <= allowed;
 }

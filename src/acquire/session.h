@@ -15,6 +15,7 @@ typedef struct clt_session {
   double weight;                   /* of its light in the sum that is checked; 0: 1 or -1, whichever leaves a drive */
   clt_image seen, deviation;       /* the last observation */
   clt_image black, black_variance; /* the mean of the repeats and the variance of that mean */
+  clt_image landmark, landmark_deviation; /* a random picture as first observed; empty without a journal of a name */
   clt_image flood, flood_variance; /* likewise, the black subtracted; an infinite variance: not seen in any repeat */
   clt_progress progress;
   clt_journal journal;
@@ -60,12 +61,21 @@ clt_status clt_session_look_before(clt_session *session, bool summed, clt_error 
 /* Whether the last observation shows what the first of these repeats (k = 0) did. Where not, all are taken again. */
 clt_status clt_session_compare_repeat(clt_session *session, int k, clt_error *error);
 
+/* Where the journal has a name: observes a random picture, by which a resumed acquisition is confirmed. */
+clt_status clt_session_take_landmark(clt_session *session, clt_error *error);
+/* After black and flood were taken from an inherited journal: whether they and the landmark are what is seen now. Where
+ * not, which is tried for the patience, everything is to begin anew. */
+clt_status clt_session_confirm(clt_session *session, clt_error *error);
+
 /* Drives every cell of every channel with one value. */
 void clt_session_fill(clt_session *session, float value);
 /* Shows session->drive and observes it; counts it and reports progress. CLT_CANCELLED where the caller wants no more.
  */
 clt_status clt_session_take(clt_session *session, const char *phase, clt_error *error);
-/* The same of a pattern that is measured: after a look where one is due, and less what the lamp drifted. */
+/* The same by the rig, whatever the journal holds, which stays as it is. */
+clt_status clt_session_take_anew(clt_session *session, const char *phase, clt_error *error);
+/* The same as clt_session_take of a pattern that is measured: after a look where one is due, and less what the lamp
+ * drifted. */
 clt_status clt_session_observe(clt_session *session, const char *phase, clt_error *error);
 /* The same of a pattern from which T is not made, which no sum contains. */
 clt_status clt_session_test(clt_session *session, const char *phase, clt_error *error);
@@ -74,6 +84,8 @@ clt_status clt_session_test(clt_session *session, const char *phase, clt_error *
 clt_status clt_session_average(clt_session *session, const char *phase, clt_image *mean, clt_image *variance,
                                clt_error *error);
 
+/* Makes the random picture of a number, each value 0 or 1, the next pattern. */
+void clt_session_draw(clt_session *session, unsigned number);
 /* False where another pattern would probably end after the seconds allowed. */
 bool clt_session_may_go_on(const clt_session *session);
 /* ||b0 + T x - y|| / ||y|| of the last observation y of the drive x, less what its noise adds. */

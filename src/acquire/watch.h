@@ -11,6 +11,9 @@
 #include "counterlight/acquire.h"
 #include "counterlight/image.h"
 
+/* Part of its light by which a tile may differ: lamps and mains are not steadier than that. */
+#define CLT_STEADY 0.01
+
 /* What is different between two observations of one picture; share 0: nothing. */
 typedef struct clt_change {
   double share;   /* of the picture's tiles */

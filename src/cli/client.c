@@ -63,6 +63,9 @@ static void print_progress(const json_t *progress) {
   double left = number_of(progress, "left");
   printf("acquiring: %s, %.0f of %.0f patterns", text_of(progress, "phase"), number_of(progress, "done"),
          number_of(progress, "total"));
+  if (number_of(progress, "resumed") > 0) {
+    printf(", %.0f from before an interruption", number_of(progress, "resumed"));
+  }
   if (json_is_number(json_object_get(progress, "left"))) {
     printf(", %.0f s left", left);
   }

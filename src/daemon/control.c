@@ -53,6 +53,7 @@ bool control_event(control *self, machine_event event) {
     return false;
   }
   bool moves = transition.next != self->state;
+  self->wishes.anew = self->wishes.anew || event == EVENT_REACQUIRE || event == EVENT_CHANGED;
   self->state = transition.next;
   if (moves) {
     arrive(self);
@@ -129,6 +130,7 @@ static void take_frames(control *self, output_frames *letter) {
 static void take_progress(control *self, measure_progress *letter) {
   if (letter->number == self->work.measure_number && self->state == STATE_ACQUIRING) {
     self->found.progress = *letter;
+    self->wishes.anew = false; /* it has begun: from here on it is resumed */
     server_notify_latest(self->service, "progress", control_progress_note(letter));
   }
 }

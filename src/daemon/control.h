@@ -25,6 +25,7 @@ enum { WAITS_FOR_CONTENT = 1, WAITS_FOR_SNAPSHOT = 2, WAITS_FOR_TRADEOFF = 3 };
 typedef struct control_wishes {
   unsigned solver;        /* bit set of solver_kind */
   bool acquire;           /* a new transport is owed, through failures and retries, until it serves */
+  bool anew;              /* it was asked for, so that none that was interrupted is resumed */
   measure_kind scope;     /* of that: MEASURE_PHOTOMETRY, MEASURE_CHANGED, MEASURE_GEOMETRY, else all of it */
   bool refine;            /* asked for, at the next verification */
   bool snapshot;          /* to be written when the picture has been photographed */

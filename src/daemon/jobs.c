@@ -8,6 +8,7 @@
 #include "base/memory.h"
 #include "daemon/control.h"
 #include "daemon/geometry.h"
+#include "daemon/store.h"
 
 bool control_has_model(const control *self) {
   const control_findings *found = &self->found;
@@ -39,6 +40,9 @@ void control_measure(control *self, measure_kind kind) {
   bool renewed = kind == MEASURE_PHOTOMETRY || kind == MEASURE_CHANGED || kind == MEASURE_GEOMETRY;
   job->model = pictured || (renewed && control_has_model(self)) ? model_hold(self->found.model) : NULL;
   geometry_file(self->config.state, job->calibration);
+  store_journal_path(self->config.state, job->journal);
+  snprintf(job->settings, sizeof job->settings, "%s", self->config.path);
+  job->anew = self->wishes.anew;
   self->work.measure_number = job->number;
   self->work.measuring = true;
   clt_mailbox_put(self->boxes->measure_jobs, job);

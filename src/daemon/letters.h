@@ -140,12 +140,15 @@ typedef struct measure_job {
   daemon_model *model;          /* VERIFY, REFINE, PHOTOMETRY, CHANGED, GEOMETRY; held; NULL: none in hand */
 
   char calibration[CLT_PATH_MAX]; /* GEOMETRY: file for the new one */
+  char journal[CLT_PATH_MAX];     /* of an acquisition, with which it is resumed */
+  char settings[CLT_PATH_MAX];    /* the configuration's file */
+  bool anew;                      /* an acquisition goes on with nothing that was measured earlier */
 } measure_job;
 
 typedef struct measure_progress {
   uint64_t number;
   char phase[48];
-  long done, total;
+  long done, total, resumed; /* as in clt_progress */
   double seconds, left;
 } measure_progress;
 

@@ -11,6 +11,7 @@
 #include "daemon/geometry.h"
 #include "daemon/refine.h"
 #include "daemon/renew.h"
+#include "daemon/resume.h"
 #include "daemon/standin.h"
 
 /* The least time between two progress letters, s. */
@@ -45,6 +46,7 @@ static bool on_progress(void *context, const clt_progress *progress) {
     *letter = (measure_progress){.number = self->number,
                                  .done = progress->done,
                                  .total = progress->total,
+                                 .resumed = progress->resumed,
                                  .seconds = progress->seconds,
                                  .left = progress->left};
     snprintf(letter->phase, sizeof letter->phase, "%s", progress->phase);
@@ -121,10 +123,18 @@ static clt_status acquire(measurer *self, const measure_job *job, measure_result
   clt_acquire_options options = job->config.acquire;
   options.scheme = job->config.scheme[0] != '\0' ? job->config.scheme : NULL;
   options.watch = options.watch < 0 ? 0 : options.watch; /* the daemon itself waits for devices */
+  char belongs[1024];
+  resume_describe(job, self->station, belongs, sizeof belongs);
+  options.journal = job->journal[0] != '\0' ? job->journal : NULL;
+  options.journal_of = belongs;
+  options.journal_age_s = RESUME_AGE_S;
+  options.journal_dispensable = true;
   options.progress = on_progress;
   options.context = self;
   self->reported_ns = 0;
-  return clt_acquire(self->station->rig, &options, &result->transport, &result->error);
+  clt_status status = clt_acquire(self->station->rig, &options, &result->transport, &result->error);
+  resume_settle(job, status);
+  return status;
 }
 
 static clt_status measure_all(measurer *self, const measure_job *job, measure_result *result) {
@@ -266,6 +276,7 @@ static clt_status work(measurer *self, measure_job *job, measure_result *result)
   if (observes(job->kind) && (self->station == NULL || self->station->rig == NULL)) {
     return clt_fail(&result->error, CLT_GONE, "the rig is not open");
   }
+  resume_begin(job);
   switch (job->kind) {
   case MEASURE_CALIBRATE:
     return calibrate(self, job, result);

@@ -32,8 +32,9 @@ json_t *control_state_note(const control *self) {
 }
 
 json_t *control_progress_note(const measure_progress *progress) {
-  return json_pack("{s:s, s:I, s:I, s:f, s:o}", "phase", progress->phase, "done", (json_int_t)progress->done, "total",
-                   (json_int_t)progress->total, "seconds", progress->seconds, "left", known(progress->left));
+  return json_pack("{s:s, s:I, s:I, s:I, s:f, s:o}", "phase", progress->phase, "done", (json_int_t)progress->done,
+                   "total", (json_int_t)progress->total, "resumed", (json_int_t)progress->resumed, "seconds",
+                   progress->seconds, "left", known(progress->left));
 }
 
 static json_t *transport_note(const transport_facts *transport) {

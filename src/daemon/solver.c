@@ -153,7 +153,7 @@ static clt_status load(solver *self, solver_job *job, solver_result *result) {
 }
 
 /* The new transport takes the old one's place, in memory and on disk, only after it has served once. */
-static clt_status adopt(solver *self, solver_job *job, solver_result *result) {
+static clt_status adopt_measured(solver *self, solver_job *job, solver_result *result) {
   daemon_model *model = NULL;
   clt_error problem = {0};
   clt_status status = model_create(job->transport, job->moves, &model, &result->error);
@@ -172,6 +172,13 @@ static clt_status adopt(solver *self, solver_job *job, solver_result *result) {
   }
   keep_drive(self, &result->picture.drive);
   return CLT_OK;
+}
+
+/* One that cannot serve would not by being taken from the journal either. */
+static clt_status adopt(solver *self, solver_job *job, solver_result *result) {
+  clt_status status = adopt_measured(self, job, result);
+  store_drop_journal(self->state);
+  return status;
 }
 
 static clt_status take_content(solver *self, solver_job *job, solver_result *result) {

@@ -17,7 +17,8 @@
 #include "base/places.h"
 #include "daemon/probe.h"
 
-static const char transport_name[] = "transport.h5", drive_name[] = "drive.npy", record_name[] = "state.json";
+static const char transport_name[] = "transport.h5", drive_name[] = "drive.npy", record_name[] = "state.json",
+                  journal_name[] = "acquisition.journal";
 
 clt_status store_path(const store *state, const char *name, char *out, clt_error *error) {
   return clt_file_join(state->folder, name, out, error);
@@ -184,6 +185,20 @@ clt_status store_save_transport(const store *state, const clt_transport *transpo
   clt_status status =
       state->writable ? store_path(state, transport_name, path, error) : not_writable(state, "the transport", error);
   return status == CLT_OK ? clt_transport_save(transport, path, error) : status;
+}
+
+void store_journal_path(const char *folder, char path[CLT_PATH_MAX]) {
+  if (clt_file_join(folder, journal_name, path, NULL) != CLT_OK) {
+    path[0] = '\0';
+  }
+}
+
+void store_drop_journal(const store *state) {
+  char path[CLT_PATH_MAX];
+  store_journal_path(state->folder, path);
+  if (unlink(path) != 0 && errno != ENOENT && state->writable) {
+    clt_log(CLT_LOG_WARNING, "%s cannot be removed: %s", path, strerror(errno));
+  }
 }
 
 clt_status store_save_drive(const store *state, const clt_image *drive, clt_error *error) {

@@ -4,6 +4,7 @@
  *   transport.h5   the transport in use, replaced only by a complete newer one
  *   content.EXT    the picture that `show` brought, as it came
  *   drive.npy      the last drive
+ *   acquisition.journal  what an acquisition under way has measured
  *   state.json     which content, and of what content the drive is
  *   snapshot/      the pictures of the last snapshot
  *
@@ -36,6 +37,8 @@ typedef struct store_record {
 clt_status store_open(const char *folder, store *out, clt_error *error);
 void store_close(store *state); /* accepts a zeroed one */
 /* The path of a file in the folder; out has room for CLT_PATH_MAX. */
+/* Of the journal of the acquisition under way in a state directory; empty where the path is too long. */
+void store_journal_path(const char *folder, char path[CLT_PATH_MAX]);
 clt_status store_path(const store *state, const char *name, char *out, clt_error *error);
 
 /* Empty where there is none or it cannot be read. */
@@ -50,6 +53,9 @@ bool store_is_foreign(const clt_transport *transport, int width, int height, int
  * transport.h5.old. */
 clt_transport *store_load_transport(const store *state, int width, int height, int channels, const char *source);
 clt_status store_save_transport(const store *state, const clt_transport *transport, clt_error *error);
+
+/* What a finished acquisition was resumed by goes; the next one is of its own. */
+void store_drop_journal(const store *state);
 
 clt_status store_save_drive(const store *state, const clt_image *drive, clt_error *error);
 /* False where there is none that can be read. */

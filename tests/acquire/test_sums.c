@@ -179,7 +179,12 @@ static bool stop_there(void *context, const clt_progress *progress) {
   return --*(long *)context != 0;
 }
 
-/* Wherever it is broken off, within sums too, the rest and T are the same to the bit. */
+/* A random picture comes before black and white, at most eight times each; six patterns confirm them, and a sum and
+ * white tell at once how bright the lamp is; sums that begin elsewhere may then be one more. */
+enum { FIRST = 17, CONFIRM = 6, LOOK = 4 };
+
+/* Wherever it is broken off, within sums too, what is looked at and T are the same; without noise, which would be
+ * another. */
 static void what_is_resumed_looks_as_it_would_have(void **state) {
   (void)state;
   double *exact = dihedral_transport(WIDTH, HEIGHT, 0.7);
@@ -189,20 +194,22 @@ static void what_is_resumed_looks_as_it_would_have(void **state) {
   snprintf(path, sizeof path, "%s/journal", folder);
   for (uint64_t run = 0; run < 3 * SCHEMES; run++) {
     uint64_t random = 900 + run;
-    fake_rig rig = make_rig(exact, run), other = make_rig(exact, run);
+    fake_rig rig = make_rig(exact, run);
+    rig.dark = rig.photon = 0;
+    fake_rig other = rig;
     int whole = 0, parts = 0;
     clt_acquire_options options = {.scheme = schemes[run % SCHEMES], .error = 0.005, .watch = -1};
     double wanted = acquire_error(&rig, &options, &whole);
-    long until = 1 + (long)((whole - 1) * test_random(&random));
+    long until = FIRST + 1 + (long)((whole - FIRST - 1) * test_random(&random));
     options.journal = path;
     options.progress = stop_there;
     options.context = &until;
     clt_transport *transport = NULL;
     assert_int_equal(clt_acquire(&other.base, &options, &transport, &error), CLT_CANCELLED);
     options.progress = NULL;
-    assert_true(acquire_error(&other, &options, &parts) == wanted);
-    assert_int_equal(parts, whole);
-    assert_int_equal(other.patterns, rig.patterns);
+    assert_true(fabs(acquire_error(&other, &options, &parts) - wanted) < 1e-6);
+    assert_in_range(parts, whole + 1 + CONFIRM, whole + 1 + CONFIRM + LOOK);
+    assert_int_equal(other.patterns, parts);
     unlink(path);
   }
   rmdir(folder);
