@@ -220,13 +220,15 @@ static void blocks_apply_transposed(const clt_transport *transport, int channel,
     {
       fold_means(own, room.partial, room.total);
       fold_means(own, room.of_blocks, room.even);
+      for (size_t b = 0; b < own->count; b++) {
+        room.total[b] -= room.even[b];
+      }
     }
 #pragma omp for schedule(dynamic, 1)
     for (size_t k = 0; k < SLICES; k++) {
       const slice of = slice_of(transport, &room, k);
       for (size_t j = of.first; j < of.end; j++) {
-        const int32_t b = own->block[j];
-        x[j] = (double)own->flux[j] * (room.total[b] - room.even[b] + room.cells[j]);
+        x[j] = (double)own->flux[j] * (room.total[own->block[j]] + room.cells[j]);
       }
       add_near_transposed(transport, channel, &of, y, x);
     }
