@@ -18,11 +18,6 @@ enum {
   DITHERED = 1 << 12       /* codes at once */
 };
 
-/* Codes by the square root of light, in which panel responses are nearly straight. */
-typedef struct code_table {
-  clt_live_piece piece[PIECES + 1];
-} code_table;
-
 typedef struct encoder {
   const clt_live_picture *picture;
   const clt_live_row_kernels *rows;
@@ -32,7 +27,7 @@ typedef struct encoder {
   clt_light_table light_of;
   int32_t *cell; /* left of each column of the panel, */
   float *across; /* and how far the column is from it to the next one */
-  code_table table[COLOURS];
+  clt_live_piece table[COLOURS][PIECES + 1];
   float *codes;
 } encoder;
 
@@ -52,15 +47,6 @@ typedef struct row_space {
 static double place(int pixel, int pixels, int cells) {
   double at = (pixel + 0.5) * cells / pixels - 0.5;
   return at < 0 ? 0 : at > cells - 1 ? cells - 1 : at;
-}
-
-static void fill_table(const clt_curve *response, code_table *table) {
-  double next = clt_curve_encode(response, 0);
-  for (int k = 0; k <= PIECES; k++) {
-    const double root = (k < PIECES ? k + 1.0 : k) / PIECES, code = next;
-    next = clt_curve_encode(response, root * root);
-    table->piece[k] = (clt_live_piece){(float)code, (float)(next - code)};
-  }
 }
 
 /* Gain and offset of every channel along the panel, on a row of cells. */
@@ -159,8 +145,7 @@ static void encode_row(const encoder *self, int y, row_space *space) {
   const float *own = unmix_row(self, space);
   for (size_t k = 0; k < (size_t)self->channels; k++) {
     self->rows->place(own + k * width, PIECES, width, space->at, space->part);
-    self->rows->interpolate(self->table[k].piece, space->at, space->part, width,
-                            self->codes + k * plane + (size_t)y * width);
+    self->rows->interpolate(self->table[k], space->at, space->part, width, self->codes + k * plane + (size_t)y * width);
   }
 }
 
@@ -192,7 +177,7 @@ static bool encode(encoder *self) {
     complete = open_space(self, &space);
 #pragma omp for schedule(static)
     for (int c = 0; c < self->channels; c++) {
-      fill_table(&self->picture->panel.response[c], &self->table[c]);
+      clt_live_tabulate(&self->picture->panel.response[c], PIECES, self->table[c]);
     }
 #pragma omp for schedule(static)
     for (int y = 0; y < self->height; y++) {

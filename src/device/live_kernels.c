@@ -5,6 +5,15 @@
 
 #define INLINE static inline __attribute__((always_inline)) /* into each variant */
 
+void clt_live_tabulate(const clt_curve *response, int pieces, clt_live_piece *piece) {
+  double next = clt_curve_encode(response, 0);
+  for (int k = 0; k <= pieces; k++) {
+    const double root = fmin((k + 1.0) / pieces, 1), code = next;
+    next = clt_curve_encode(response, root * root);
+    piece[k] = (clt_live_piece){(float)code, (float)(next - code)};
+  }
+}
+
 typedef float four __attribute__((vector_size(4 * sizeof(float))));
 typedef uint64_t two __attribute__((vector_size(2 * sizeof(uint64_t))));
 

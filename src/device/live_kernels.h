@@ -7,12 +7,18 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "counterlight/image.h"
+
 enum { CLT_LIVE_COLOURS = 3 };
 
 /* One piece of a function that is linear piece by piece: value + part step, part in 0..1. Both come with one load. */
 typedef struct clt_live_piece {
   float value, step;
 } clt_live_piece;
+
+/* The codes of a panel by the square root of light, in which responses are nearly straight: piece[k] begins at light
+ * (k / pieces)^2; pieces + 1 of them, the last without a step. */
+void clt_live_tabulate(const clt_curve *response, int pieces, clt_live_piece *piece);
 
 /* A field along a row of the panel, as it is on the two rows of cells that the row lies between. */
 typedef struct clt_live_field {
