@@ -79,7 +79,7 @@ static clt_status take_known(libcamera_camera *self, int64_t deadline_ns, clt_li
   do {
     status = clt_libcamera_take(self->stream, deadline_ns, picture, error);
   } while (status == CLT_OK && !settle_exposure(self, picture));
-  if (status == CLT_OK && !picture->stamp_starts) {
+  if (status == CLT_OK) {
     picture->stamp_ns -= (int64_t)ceil(picture->exposure_s * 1e9);
   }
   return status;
