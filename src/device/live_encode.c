@@ -12,8 +12,10 @@
 
 enum {
   COLOURS = CLT_LIVE_COLOURS,
-  FIELDS = 2,              /* gain and offset */
-  PIECES = 1024,           /* of a response */
+  FIELDS = 2,    /* gain and offset */
+  PIECES = 1024, /* of a response */
+  ROWS_AT_ONCE = 64,
+  CHUNKS_AT_ONCE = 16,
   WORTH_SHARING = 1 << 16, /* codes that pay for waking threads */
   DITHERED = 1 << 12       /* codes at once */
 };
@@ -179,7 +181,7 @@ static bool encode(encoder *self) {
     for (int c = 0; c < self->channels; c++) {
       clt_live_tabulate(&self->picture->panel.response[c], PIECES, self->table[c]);
     }
-#pragma omp for schedule(static)
+#pragma omp for schedule(dynamic, ROWS_AT_ONCE)
     for (int y = 0; y < self->height; y++) {
       if (complete) {
         encode_row(self, y, &space);
@@ -235,7 +237,7 @@ void clt_live_dither(float *codes, size_t count, int bits, uint32_t seed) {
   const clt_live_row_kernels *rows = clt_live_row_choose();
   const float full = (float)((1 << bits) - 1);
   const uint32_t start = (uint32_t)clt_random_scramble(seed + 1u);
-#pragma omp parallel for schedule(static) if (count >= WORTH_SHARING)
+#pragma omp parallel for schedule(dynamic, CHUNKS_AT_ONCE) if (count >= WORTH_SHARING)
   for (size_t k = 0; k < count; k += DITHERED) {
     rows->dither(codes + k, count - k < DITHERED ? count - k : DITHERED, full, start + (uint32_t)k);
   }

@@ -13,7 +13,8 @@
 enum {
   CODES = 256,
   COLOURS = 3,
-  PAD = 16,               /* numbers between rows, of which a pixel read as a vector takes one */
+  PAD = 16, /* numbers between rows, of which a pixel read as a vector takes one */
+  ROWS_AT_ONCE = 16,
   WORTH_SHARING = 1 << 16 /* codes that pay for waking threads */
 };
 
@@ -94,7 +95,7 @@ static void mean_rows(const averaging *self, float *means) {
   {
     float *sums = self->sums + 2 * space * (size_t)omp_get_thread_num();
     int kept = -1;
-#pragma omp for schedule(static)
+#pragma omp for schedule(dynamic, ROWS_AT_ONCE)
     for (int y = 0; y < self->height; y++) {
       mean_row(self, y, sums, sums + space, &kept, means);
     }

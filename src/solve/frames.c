@@ -9,7 +9,7 @@
 #include "solve/live.h"
 #include "solve/mapping.h"
 
-enum { COLOURS = 3, WORTH_SHARING = 1 << 16 /* values that pay for waking threads */ };
+enum { COLOURS = 3 };
 
 static const float GAIN_MOST = 4;
 static const double SMOOTH_S = 0.5;
@@ -24,7 +24,6 @@ struct clt_frames {
   clt_mapping *mapping; /* NULL: scale 1, offset 0 */
   double white[CLT_CHANNELS_MAX];
   size_t values;           /* channels * cells */
-  bool shared;             /* they are many enough for threads */
   float *direct;           /* 1 / F, 0 at dark cells */
   float *means;            /* of the content: three colours, where the transport has one channel */
   float *picture, *before; /* the channels of this frame and of the one before */
@@ -62,7 +61,6 @@ static clt_status prepare(clt_frames *self, const clt_frames_options *options, c
     return clt_fail(error, CLT_FAILED, "no memory for moving pictures of %zu cells", cells);
   }
   self->values = values;
-  self->shared = values >= WORTH_SHARING;
   self->means = work;
   self->direct = work + COLOURS * cells;
   self->picture = self->direct + values;
@@ -131,10 +129,11 @@ static clt_status take_picture(clt_frames *self, const uint8_t *content, int wid
   return CLT_OK;
 }
 
+/* This pass and those below are done sooner than a thread comes that others keep from its processor. */
 static bool is_cut(const clt_frames *self) {
   const float *picture = self->picture, *before = self->before;
   double change = 0, light = 0;
-#pragma omp parallel for simd reduction(+ : change, light) schedule(static) if (parallel : self->shared)
+#pragma omp simd reduction(+ : change, light)
   for (size_t i = 0; i < self->values; i++) {
     const double now = (double)picture[i], then = (double)before[i];
     change += fabs(now - then);
@@ -154,12 +153,11 @@ static bool map(clt_frames *self, double seconds, clt_frames_result *result) {
     result->scale = clt_mapping_scale(self->mapping);
     result->offset = clt_mapping_offset(self->mapping);
   }
-#pragma omp parallel if (self->shared)
   for (int c = 0; c < self->info.channels; c++) {
     const float factor = (float)(self->white[c] * result->scale), more = (float)(self->white[c] * result->offset);
     const float *picture = self->picture + (size_t)c * cells;
     float *target = self->target + (size_t)c * cells;
-#pragma omp for simd schedule(static) nowait
+#pragma omp simd
     for (size_t i = 0; i < cells; i++) {
       target[i] = factor * picture[i] + more;
     }
@@ -171,7 +169,7 @@ static bool map(clt_frames *self, double seconds, clt_frames_result *result) {
 static void follow_directly(clt_frames *self) {
   const float *target = self->target, *then_target = self->then_target, *then_drive = self->then_drive;
   float *drive = self->drive;
-#pragma omp parallel for simd schedule(static) if (parallel : self->shared)
+#pragma omp simd
   for (size_t i = 0; i < self->values; i++) {
     float x = then_drive[i] + (target[i] - then_target[i]) * self->direct[i];
     x = x > 0 ? x : 0;
@@ -205,13 +203,12 @@ static clt_status solve(clt_frames *self, clt_frames_result *result, clt_error *
 
 static void fill_fields(const clt_frames *self, double scale, float *gain, float *offset) {
   const size_t cells = self->info.cols;
-#pragma omp parallel if (self->shared)
   for (int k = 0; k < COLOURS; k++) {
     const int c = k < self->info.channels ? k : 0;
     const float factor = (float)(scale * self->white[c]);
     const size_t from = (size_t)c * cells, to = (size_t)k * cells;
     const float *direct = self->direct + from, *picture = self->picture + from, *drive = self->shown + from;
-#pragma omp for simd schedule(static) nowait
+#pragma omp simd
     for (size_t i = 0; i < cells; i++) {
       const float whole = factor * direct[i], own = whole < GAIN_MOST ? whole : GAIN_MOST;
       gain[to + i] = own;

@@ -14,8 +14,6 @@
 #include "base/memory.h"
 #include "solve/method.h"
 
-enum { WORTH_SHARING = 1 << 16 /* cells that pay for waking threads */ };
-
 /* Nearer than this to where they belong, scale and offset stay. */
 static const double NEAR = 1e-4;
 /* Time after a cut for which they follow faster, and how much, s. */
@@ -132,7 +130,6 @@ static void step(clt_mapping *self, int c, const float *picture) {
   double *p = self->p + at, moved = 0;
   picture += at;
   clt_transport_apply(self->transport, c, p, self->product);
-#pragma omp parallel for simd reduction(max : moved) schedule(static) if (parallel : cells >= WORTH_SHARING)
   for (size_t i = 0; i < cells; i++) {
     const double change = way[i] * (white * (double)picture[i] - product[i]), far = fabs(change);
     p[i] += change;
@@ -147,7 +144,6 @@ static void need(clt_mapping *self, int c) {
   const double *p = self->p + at, *w = self->w + at, *b = self->b + at, *lift = self->lift + at;
   const double *room = self->room + at, larger = 1 / self->scale;
   double offset = 0, most = 1;
-#pragma omp parallel for simd reduction(max : offset) schedule(static) if (parallel : cells >= WORTH_SHARING)
   for (size_t i = 0; i < cells; i++) {
     const double own = (larger * b[i] - p[i]) * lift[i];
     offset = own > offset ? own : offset;
@@ -156,7 +152,6 @@ static void need(clt_mapping *self, int c) {
   for (int k = 0; k < self->info.channels; k++) {
     offset = fmax(offset, self->offset_of[k]);
   }
-#pragma omp parallel for simd reduction(max : most) schedule(static) if (parallel : cells >= WORTH_SHARING)
   for (size_t i = 0; i < cells; i++) {
     const double full = (p[i] + offset * w[i]) * room[i];
     most = full > most ? full : most;
