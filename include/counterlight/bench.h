@@ -37,6 +37,7 @@ typedef struct clt_bench_peer {
   double error;             /* ||T x - b|| / ||b|| of the first, by T as stored */
   double ratio, warm_ratio; /* ms over the frame's cold_ms, warm_ms over its p50_ms */
   int entries;              /* that each row of its matrix keeps; 0: it takes T as stored */
+  bool converged;           /* false: it does not come to the end here, and nothing else of it was measured */
 } clt_bench_peer;
 
 typedef struct clt_bench_point {

@@ -38,6 +38,8 @@ typedef struct clt_camera_info {
   double full_well;    /* electrons at full scale, > 0: photon noise has variance signal * full_well */
   double read_noise;   /* electrons, rms */
   bool own_pixels;     /* which pixel sees which part of the picture must be measured: no grid is promised */
+  double step;         /* code values by half of which rounding moves a sample at most: more than 1 where samples are
+                        * computed of fewer bits (Y'CbCr, filter mosaics); 0: 1 */
 } clt_camera_info;
 
 typedef struct clt_camera clt_camera;

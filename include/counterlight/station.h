@@ -26,7 +26,7 @@ typedef struct clt_station_config {
    * the calibration, or else from the scene, when the rig is opened. */
   clt_rig_config rig;
   bool projector_response_given, camera_response_given; /* rig.projector, rig.camera come from the file */
-  bool verify_given;                                    /* and rig.verify; if not, it is true without a calibration */
+  bool verify_given;                                    /* and rig.verify; if not, it is true */
   char scheme[24];             /* of the acquisition: "auto", "brute", "hadamard", "hierarchical", "blocks" */
   clt_acquire_options acquire; /* scheme, progress and context are left to the caller; watch -1 where nothing is said */
 } clt_station_config;

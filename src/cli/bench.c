@@ -41,9 +41,13 @@ static json_t *peers_json(const clt_bench_report *report) {
   json_t *all = json_array();
   for (int k = 0; k < report->peer_count; k++) {
     const clt_bench_peer *peer = &report->peer[k];
-    json_array_append_new(all, json_pack("{s:s, s:f, s:f, s:f, s:f, s:f, s:i}", "name", peer->name, "ms", peer->ms,
-                                         "warm_ms", peer->warm_ms, "error", peer->error, "ratio", peer->ratio,
-                                         "warm_ratio", peer->warm_ratio, "entries", peer->entries));
+    json_t *one = json_pack("{s:s, s:b}", "name", peer->name, "converged", peer->converged);
+    if (peer->converged) {
+      json_object_update_new(one, json_pack("{s:f, s:f, s:f, s:f, s:f, s:i}", "ms", peer->ms, "warm_ms", peer->warm_ms,
+                                            "error", peer->error, "ratio", peer->ratio, "warm_ratio", peer->warm_ratio,
+                                            "entries", peer->entries));
+    }
+    json_array_append_new(all, one);
   }
   return all;
 }
@@ -58,6 +62,10 @@ static json_t *scaling_json(const clt_bench_report *report) {
 }
 
 static void print_peer(const clt_bench_peer *peer) {
+  if (!peer->converged) {
+    printf("%-22s does not converge with this transport\n", peer->name);
+    return;
+  }
   printf("%-22s %8.1f ms from nothing (%.0f x), %.1f ms warm (%.0f x), %.2f %% off", peer->name, peer->ms, peer->ratio,
          peer->warm_ms, peer->warm_ratio, 100 * peer->error);
   if (peer->entries > 0) {

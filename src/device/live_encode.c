@@ -1,70 +1,99 @@
 /* What a projector that encodes by itself does, for those that cannot: on the processor, a row of the panel at a time.
- * Fields are interpolated down the grid once a row, then across it. */
-#include <math.h>
+ * Fields are interpolated across each row of cells once, then down between two of them. */
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/memory.h"
 #include "base/random.h"
 #include "counterlight/device.h"
+#include "device/live_kernels.h"
 #include "image/cell_means.h"
+#include "image/light_kernels.h"
 
-enum { COLOURS = 3, STEPS = 1024, CODES = 256 };
-
-/* Where a pixel's centre lies between two cells' centres: value = (1 - part) v[cell] + part v[cell + 1]. */
-typedef struct between {
-  int cell;
-  float part;
-} between;
-
-/* Codes by the square root of light, in which panel responses are nearly straight. */
-typedef struct code_table {
-  float code[STEPS + 2];
-} code_table;
-
-static between place(int pixel, int pixels, int cells) {
-  double at = (pixel + 0.5) * cells / pixels - 0.5;
-  at = at < 0 ? 0 : at > cells - 1 ? cells - 1 : at;
-  int cell = (int)at;
-  return (between){cell, (float)(at - cell)};
-}
-
-static void fill_table(const clt_curve *response, code_table *table) {
-  for (int k = 0; k < STEPS + 2; k++) {
-    double root = (double)(k < STEPS ? k : STEPS) / STEPS;
-    table->code[k] = (float)clt_curve_encode(response, root * root);
-  }
-}
-
-static inline float look_up(const code_table *table, float light) {
-  float at = STEPS * sqrtf(light < 0 ? 0 : light > 1 ? 1 : light);
-  int k = (int)at;
-  return table->code[k] + (at - (float)k) * (table->code[k + 1] - table->code[k]);
-}
+enum {
+  COLOURS = CLT_LIVE_COLOURS,
+  FIELDS = 2,    /* gain and offset */
+  PIECES = 1024, /* of a response */
+  ROWS_AT_ONCE = 64,
+  CHUNKS_AT_ONCE = 16,
+  WORTH_SHARING = 1 << 16, /* codes that pay for waking threads */
+  DITHERED = 1 << 12       /* codes at once */
+};
 
 typedef struct encoder {
   const clt_live_picture *picture;
+  const clt_live_row_kernels *rows;
+  const clt_light_kernels *codes_to_light;
   int channels, height, width;
-  const float *light; /* of the content, on the panel; three channels; NULL: the content has the panel's size */
-  float light_of[CODES];
-  between *across;
-  code_table table[COLOURS];
+  float *light; /* of the content, on the panel; three channels; NULL: the content has the panel's size */
+  clt_light_table light_of;
+  int32_t *cell; /* left of each column of the panel, */
+  float *across; /* and how far the column is from it to the next one */
+  clt_live_piece table[COLOURS][PIECES + 1];
   float *codes;
 } encoder;
 
 /* Workspace of a thread, for one row. */
 typedef struct row_space {
   float *light, *drive; /* three channels of the row each */
-  float *fields;        /* gain and offset of each cell beside the row, and of the last one twice */
+  float *part;
+  int32_t *at;
+  uint8_t *plane;        /* codes of the content, three channels */
+  clt_live_piece *piece; /* of a field along a row of cells */
+  float *field[2];       /* on two rows of cells: gain and offset of three channels along the panel */
+  int cells[2];          /* which rows these are, -1: none */
+  void *memory;
 } row_space;
 
-static void light_row(const encoder *self, int y, float *light) {
-  size_t width = (size_t)self->width, row = (size_t)y * width, plane = (size_t)self->height * width;
-  const uint8_t *content = self->picture->content + row * COLOURS;
-  for (size_t c = 0; c < COLOURS; c++) {
-    for (size_t x = 0; x < width; x++) {
-      light[c * width + x] =
-          self->light != NULL ? self->light[c * plane + row + x] : self->light_of[content[x * COLOURS + c]];
+/* Where a pixel's centre lies between two cells' centres, in cells. */
+static double place(int pixel, int pixels, int cells) {
+  double at = (pixel + 0.5) * cells / pixels - 0.5;
+  return at < 0 ? 0 : at > cells - 1 ? cells - 1 : at;
+}
+
+/* Gain and offset of every channel along the panel, on a row of cells. */
+static void expand_fields(const encoder *self, int cells, const row_space *space, float *field) {
+  const clt_live_picture *picture = self->picture;
+  const size_t grid = (size_t)picture->grid_width, plane = grid * (size_t)picture->grid_height;
+  for (size_t k = 0; k < FIELDS * (size_t)self->channels; k++) {
+    const float *whole = k % FIELDS == 0 ? picture->gain : picture->offset;
+    const float *own = whole + k / FIELDS * plane + (size_t)cells * grid;
+    for (size_t i = 0; i + 1 < grid; i++) {
+      space->piece[i] = (clt_live_piece){own[i], own[i + 1] - own[i]};
     }
+    space->piece[grid - 1] = (clt_live_piece){own[grid - 1], 0};
+    self->rows->interpolate(space->piece, self->cell, self->across, (size_t)self->width,
+                            field + k * (size_t)self->width);
+  }
+}
+
+/* Has the fields ready on the rows of cells `upper` and the next; the last is its own next. */
+static void reach_cells(const encoder *self, int upper, row_space *space) {
+  if (space->cells[1] == upper) {
+    float *above = space->field[1];
+    space->field[1] = space->field[0];
+    space->field[0] = above;
+    space->cells[1] = space->cells[0];
+    space->cells[0] = upper;
+  }
+  for (int k = 0; k < 2; k++) {
+    const int wanted = upper + k < self->picture->grid_height ? upper + k : upper;
+    if (space->cells[k] != wanted) {
+      expand_fields(self, wanted, space, space->field[k]);
+      space->cells[k] = wanted;
+    }
+  }
+}
+
+static void light_row(const encoder *self, int y, const row_space *space) {
+  const size_t width = (size_t)self->width, row = (size_t)y * width, plane = (size_t)self->height * width;
+  if (self->light == NULL) {
+    self->rows->split(self->picture->content + row * COLOURS, width, space->plane);
+    self->codes_to_light->look_up(&self->light_of, space->plane, COLOURS * width, space->light);
+    return;
+  }
+  for (size_t c = 0; c < COLOURS; c++) {
+    memcpy(space->light + c * width, self->light + c * plane + row, width * sizeof(float));
   }
 }
 
@@ -75,137 +104,141 @@ static void keep_luminance(size_t width, float *light) {
   }
 }
 
-static void field_row(const clt_live_picture *picture, int c, const between *down, float *fields) {
-  size_t grid = (size_t)picture->grid_width, height = (size_t)picture->grid_height;
-  size_t upper = ((size_t)c * height + (size_t)down->cell) * grid;
-  size_t lower = (size_t)down->cell + 1 < height ? upper + grid : upper;
-  for (size_t i = 0; i < grid; i++) {
-    const float *gain = picture->gain + i, *offset = picture->offset + i;
-    fields[2 * i] = gain[upper] + down->part * (gain[lower] - gain[upper]);
-    fields[2 * i + 1] = offset[upper] + down->part * (offset[lower] - offset[upper]);
-  }
-  fields[2 * grid] = fields[2 * grid - 2];
-  fields[2 * grid + 1] = fields[2 * grid - 1];
-}
-
 /* drive[c * width + x] of a row of the panel, 0..1. */
-static void drive_row(const encoder *self, int y, const row_space *space) {
-  size_t width = (size_t)self->width;
-  between down = place(y, self->height, self->picture->grid_height);
-  light_row(self, y, space->light);
+static void drive_row(const encoder *self, int y, row_space *space) {
+  const size_t width = (size_t)self->width;
+  const double down = place(y, self->height, self->picture->grid_height);
+  reach_cells(self, (int)down, space);
+  light_row(self, y, space);
   if (self->channels != COLOURS) {
     keep_luminance(width, space->light);
   }
-  for (int c = 0; c < self->channels; c++) {
-    const float *own = space->light + (size_t)c * width;
-    float *drive = space->drive + (size_t)c * width;
-    field_row(self->picture, c, &down, space->fields);
-    for (size_t x = 0; x < width; x++) {
-      const float *field = space->fields + 2 * (size_t)self->across[x].cell;
-      float part = self->across[x].part, gain = field[0] + part * (field[2] - field[0]);
-      float value = gain * own[x] + field[1] + part * (field[3] - field[1]);
-      drive[x] = value > 0 ? (value < 1 ? value : 1) : 0; /* NaN is dark */
-    }
+  for (size_t c = 0; c < (size_t)self->channels; c++) {
+    const float *upper = space->field[0] + c * FIELDS * width, *lower = space->field[1] + c * FIELDS * width;
+    const clt_live_field gain = {upper, lower}, offset = {upper + width, lower + width};
+    self->rows->drive(&gain, &offset, (float)(down - (int)down), space->light + c * width, width,
+                      space->drive + c * width);
   }
 }
 
-/* Undoes crosstalk: light takes the place of what the content was. */
+/* Undoes crosstalk, clipped to 0..1: light takes the place of what the content was. */
 static const float *unmix_row(const encoder *self, const row_space *space) {
   const clt_panel *panel = &self->picture->panel;
-  size_t width = (size_t)self->width;
+  const size_t width = (size_t)self->width;
+  const float *red = space->drive, *green = red + width, *blue = green + width;
   if (!panel->mixes || self->channels != COLOURS) {
     return space->drive;
   }
-  for (int k = 0; k < COLOURS; k++) {
+  for (size_t k = 0; k < COLOURS; k++) {
     const float row[COLOURS] = {(float)panel->unmix[k][0], (float)panel->unmix[k][1], (float)panel->unmix[k][2]};
+    float *light = space->light + k * width;
     for (size_t x = 0; x < width; x++) {
-      space->light[(size_t)k * width + x] =
-          row[0] * space->drive[x] + row[1] * space->drive[width + x] + row[2] * space->drive[2 * width + x];
+      float own = row[0] * red[x] + row[1] * green[x] + row[2] * blue[x];
+      own = own > 0 ? own : 0;
+      light[x] = own < 1 ? own : 1;
     }
   }
   return space->light;
 }
 
-static void encode_row(const encoder *self, int y, const row_space *space) {
-  size_t width = (size_t)self->width, plane = (size_t)self->height * width;
+static void encode_row(const encoder *self, int y, row_space *space) {
+  const size_t width = (size_t)self->width, plane = (size_t)self->height * width;
   drive_row(self, y, space);
   const float *own = unmix_row(self, space);
-  for (int k = 0; k < self->channels; k++) {
-    float *codes = self->codes + (size_t)k * plane + (size_t)y * width;
-    for (size_t x = 0; x < width; x++) {
-      codes[x] = look_up(&self->table[k], own[(size_t)k * width + x]);
-    }
+  for (size_t k = 0; k < (size_t)self->channels; k++) {
+    self->rows->place(own + k * width, PIECES, width, space->at, space->part);
+    self->rows->interpolate(self->table[k], space->at, space->part, width, self->codes + k * plane + (size_t)y * width);
   }
 }
 
+static bool open_space(const encoder *self, row_space *space) {
+  enum { ROWS = 2 * COLOURS + 2 + 2 * COLOURS * FIELDS + 1 }; /* codes of three channels are within one of floats */
+  const size_t width = (size_t)self->width;
+  float *next = clt_alloc(ROWS * width + 2 * (size_t)self->picture->grid_width, sizeof *next);
+  *space = (row_space){.memory = next, .cells = {-1, -1}};
+  if (next == NULL) {
+    return false;
+  }
+  space->light = next;
+  space->drive = space->light + COLOURS * width;
+  space->part = space->drive + COLOURS * width;
+  space->at = (int32_t *)(space->part + width);
+  space->plane = (uint8_t *)(space->part + 2 * width);
+  space->field[0] = space->part + 3 * width;
+  space->field[1] = space->field[0] + COLOURS * FIELDS * width;
+  space->piece = (clt_live_piece *)(space->field[1] + COLOURS * FIELDS * width);
+  return true;
+}
+
 static bool encode(encoder *self) {
-  size_t width = (size_t)self->width, cells = (size_t)self->picture->grid_width;
+  const bool shared = (size_t)self->height * (size_t)self->width * COLOURS >= WORTH_SHARING;
   bool complete = true;
-#pragma omp parallel reduction(&& : complete)
+#pragma omp parallel reduction(&& : complete) if (shared)
   {
-    float *values = clt_alloc(2 * COLOURS * width + 2 * (cells + 1), sizeof *values);
-    complete = values != NULL;
+    row_space space;
+    complete = open_space(self, &space);
 #pragma omp for schedule(static)
+    for (int c = 0; c < self->channels; c++) {
+      clt_live_tabulate(&self->picture->panel.response[c], PIECES, self->table[c]);
+    }
+#pragma omp for schedule(dynamic, ROWS_AT_ONCE)
     for (int y = 0; y < self->height; y++) {
-      if (values != NULL) {
-        const row_space space = {values, values + COLOURS * width, values + 2 * COLOURS * width};
+      if (complete) {
         encode_row(self, y, &space);
       }
     }
-    free(values);
+    free(space.memory);
   }
   return complete;
 }
 
 /* The content's light on the panel, where it has another size. */
-static clt_status fit_content(encoder *self, float **light, clt_error *error) {
+static clt_status fit_content(encoder *self, clt_error *error) {
   const clt_live_picture *picture = self->picture;
   if (picture->width == self->width && picture->height == self->height) {
-    clt_srgb_light(self->light_of);
+    clt_light_fill(&self->light_of);
     return CLT_OK;
   }
-  *light = clt_alloc(COLOURS * (size_t)self->width * (size_t)self->height, sizeof **light);
-  self->light = *light;
-  return *light != NULL ? clt_cell_means(picture->content, picture->width, picture->height, self->width, self->height,
-                                         *light, error)
-                        : clt_fail(error, CLT_FAILED, "a moving picture: out of memory");
+  self->light = clt_alloc(COLOURS * (size_t)self->width * (size_t)self->height, sizeof *self->light);
+  return self->light != NULL ? clt_cell_means(picture->content, picture->width, picture->height, self->width,
+                                              self->height, self->light, error)
+                             : clt_fail(error, CLT_FAILED, "a moving picture: out of memory");
 }
 
 clt_status clt_live_encode(const clt_live_picture *picture, int channels, int height, int width, float *codes,
                            clt_error *error) {
-  encoder self = {.picture = picture, .channels = channels, .height = height, .width = width, .codes = codes};
-  float *light = NULL;
+  encoder self = {.picture = picture,
+                  .rows = clt_live_row_choose(),
+                  .codes_to_light = clt_light_choose(),
+                  .channels = channels,
+                  .height = height,
+                  .width = width,
+                  .codes = codes};
+  self.cell = clt_alloc((size_t)width, sizeof *self.cell);
   self.across = clt_alloc((size_t)width, sizeof *self.across);
-  clt_status status = self.across != NULL ? fit_content(&self, &light, error)
-                                          : clt_fail(error, CLT_FAILED, "a moving picture: out of memory");
+  clt_status status = self.cell != NULL && self.across != NULL
+                          ? fit_content(&self, error)
+                          : clt_fail(error, CLT_FAILED, "a moving picture: out of memory");
   if (status == CLT_OK) {
     for (int x = 0; x < width; x++) {
-      self.across[x] = place(x, width, picture->grid_width);
-    }
-    for (int c = 0; c < channels; c++) {
-      fill_table(&picture->panel.response[c], &self.table[c]);
+      const double at = place(x, width, picture->grid_width);
+      self.cell[x] = (int32_t)at;
+      self.across[x] = (float)(at - self.cell[x]);
     }
     status = encode(&self) ? CLT_OK : clt_fail(error, CLT_FAILED, "a moving picture: out of memory");
   }
-  free(light);
+  free(self.light);
+  free(self.cell);
   free(self.across);
   return status;
 }
 
-/* A number in 0..1 for each counter: 32 bits, of which vectors are multiplied at once. The multipliers are those
- * that Wellons found to bias least. */
-static inline float scatter(uint32_t key) {
-  key = (key ^ (key >> 16)) * 0x7feb352du;
-  key = (key ^ (key >> 15)) * 0x846ca68bu;
-  return (float)((key ^ (key >> 16)) >> 8) * 0x1p-24F;
-}
-
 void clt_live_dither(float *codes, size_t count, int bits, uint32_t seed) {
+  const clt_live_row_kernels *rows = clt_live_row_choose();
   const float full = (float)((1 << bits) - 1);
   const uint32_t start = (uint32_t)clt_random_scramble(seed + 1u);
-#pragma omp parallel for simd schedule(static)
-  for (size_t k = 0; k < count; k++) {
-    float step = (float)(int)(codes[k] * full + scatter(start + (uint32_t)k));
-    codes[k] = (step < full ? step : full) / full;
+#pragma omp parallel for schedule(dynamic, CHUNKS_AT_ONCE) if (count >= WORTH_SHARING)
+  for (size_t k = 0; k < count; k += DITHERED) {
+    rows->dither(codes + k, count - k < DITHERED ? count - k : DITHERED, full, start + (uint32_t)k);
   }
 }

@@ -8,8 +8,15 @@
 
 #include "base/memory.h"
 #include "counterlight/image.h"
+#include "image/light_kernels.h"
 
-enum { CODES = 256, COLOURS = 3 };
+enum {
+  CODES = 256,
+  COLOURS = 3,
+  PAD = 16, /* numbers between rows, of which a pixel read as a vector takes one */
+  ROWS_AT_ONCE = 16,
+  WORTH_SHARING = 1 << 16 /* codes that pay for waking threads */
+};
 
 /* Inputs first..last that lie in output j of m, of n inputs; the first and the last may lie in it partly. In units of
  * 1 / m of an input the output is [j n, (j + 1) n). */
@@ -29,74 +36,96 @@ static span span_of(int j, int n, int m) {
   return found;
 }
 
-static float share(const span *of, int k) {
-  return k == of->first ? of->before : k == of->last ? of->after : 1.0F;
-}
+/* Red, green, blue of a pixel and whatever comes after them: four numbers make a vector everywhere. */
+typedef float pixel __attribute__((vector_size(4 * sizeof(float))));
 
-/* sums[i] = sum over the span's rows of share * light. */
-static void sum_rows(const uint8_t *content, size_t row, const span *rows, const float *light, float *sums) {
-  for (int y = rows->first; y <= rows->last; y++) {
-    const uint8_t *codes = content + (size_t)y * row;
-    float weight = share(rows, y);
-    if (y == rows->first) {
-      for (size_t i = 0; i < row; i++) {
-        sums[i] = weight * light[codes[i]];
-      }
-    } else {
-      for (size_t i = 0; i < row; i++) {
-        sums[i] += weight * light[codes[i]];
-      }
-    }
-  }
+static inline void add_pixel(const float *sums, int x, float weight, pixel *to) {
+  pixel own;
+  memcpy(&own, sums + COLOURS * (size_t)x, sizeof own);
+  *to += weight * own;
 }
 
 /* One cell's mean: sums over its columns, times 1 / area. */
-static void mean_columns(const float *sums, const span *columns, float scale, size_t plane, float *mean) {
-  float sum[COLOURS] = {0};
-  for (int x = columns->first; x <= columns->last; x++) {
-    float weight = share(columns, x);
-    for (int c = 0; c < COLOURS; c++) {
-      sum[c] += weight * sums[COLOURS * x + c];
-    }
+static inline void mean_columns(const float *sums, const span *columns, float scale, size_t plane, float *mean) {
+  pixel sum = {0};
+  add_pixel(sums, columns->first, columns->before, &sum);
+  for (int x = columns->first + 1; x < columns->last; x++) {
+    add_pixel(sums, x, 1, &sum);
   }
-  for (int c = 0; c < COLOURS; c++) {
-    mean[(size_t)c * plane] = scale * sum[c];
+  if (columns->last > columns->first) {
+    add_pixel(sums, columns->last, columns->after, &sum);
+  }
+  for (size_t c = 0; c < COLOURS; c++) {
+    mean[c * plane] = scale * sum[c];
   }
 }
 
-void clt_srgb_light(float light[CODES]) {
-  const clt_curve srgb = {.kind = CLT_CURVE_SRGB};
-  for (int code = 0; code < CODES; code++) {
-    light[code] = (float)clt_curve_decode(&srgb, code / (double)(CODES - 1));
+/* What every row of cells is averaged by. */
+typedef struct averaging {
+  const clt_light_kernels *kernels;
+  clt_light_table table;
+  const uint8_t *content;
+  size_t row; /* codes */
+  int content_height, width, height;
+  float scale;
+  span *columns;
+  float *sums; /* two rows of each thread */
+} averaging;
+
+/* A row of cells; *kept is the row of content whose light is in `light`, -1: none. */
+static void mean_row(const averaging *self, int y, float *sums, float *light, int *kept, float *means) {
+  const size_t width = (size_t)self->width, plane = width * (size_t)self->height;
+  const span rows = span_of(y, self->content_height, self->height);
+  const uint8_t *first = self->content + (size_t)rows.first * self->row;
+  const clt_light_rows more = {first + self->row, self->row, (size_t)(rows.last - rows.first), rows.before, rows.after};
+  if (*kept != rows.first) {
+    self->kernels->look_up(&self->table, first, self->row, light);
+  }
+  self->kernels->add_rows(&self->table, &more, self->row, light, sums);
+  *kept = rows.last;
+  for (size_t x = 0; x < width; x++) {
+    mean_columns(sums, &self->columns[x], self->scale, plane, means + (size_t)y * width + x);
+  }
+}
+
+static void mean_rows(const averaging *self, float *means) {
+  const size_t space = self->row + PAD;
+  const bool shared = self->row * (size_t)self->content_height >= WORTH_SHARING;
+#pragma omp parallel if (shared)
+  {
+    float *sums = self->sums + 2 * space * (size_t)omp_get_thread_num();
+    int kept = -1;
+#pragma omp for schedule(dynamic, ROWS_AT_ONCE)
+    for (int y = 0; y < self->height; y++) {
+      mean_row(self, y, sums, sums + space, &kept, means);
+    }
   }
 }
 
 clt_status clt_cell_means(const uint8_t *content, int content_width, int content_height, int width, int height,
                           float *means, clt_error *error) {
-  float light[CODES];
-  size_t row = (size_t)content_width * COLOURS, plane = (size_t)width * (size_t)height;
-  float *sums = clt_alloc(row * (size_t)omp_get_max_threads(), sizeof *sums);
-  span *columns = clt_alloc((size_t)width, sizeof *columns);
-  float scale = (float)((double)width / content_width * height / content_height);
-  bool ready = sums != NULL && columns != NULL;
-  clt_srgb_light(light);
-  for (int x = 0; ready && x < width; x++) {
-    columns[x] = span_of(x, content_width, width);
-  }
-#pragma omp parallel for schedule(static)
-  for (int y = 0; y < height; y++) {
-    if (ready) {
-      float *own = sums + row * (size_t)omp_get_thread_num();
-      span rows = span_of(y, content_height, height);
-      sum_rows(content, row, &rows, light, own);
-      for (int x = 0; x < width; x++) {
-        mean_columns(own, &columns[x], scale, plane, means + (size_t)y * (size_t)width + (size_t)x);
-      }
+  averaging self = {.kernels = clt_light_choose(),
+                    .content = content,
+                    .row = (size_t)content_width * COLOURS,
+                    .content_height = content_height,
+                    .width = width,
+                    .height = height,
+                    .scale = (float)((double)width / content_width * height / content_height)};
+  self.sums = clt_alloc(2 * (self.row + PAD) * (size_t)omp_get_max_threads(), sizeof *self.sums);
+  self.columns = clt_alloc((size_t)width, sizeof *self.columns);
+  clt_status status = CLT_OK;
+  if (self.sums != NULL && self.columns != NULL) {
+    for (int x = 0; x < width; x++) {
+      self.columns[x] = span_of(x, content_width, width);
     }
+    clt_light_fill(&self.table);
+    mean_rows(&self, means);
+  } else {
+    status = clt_fail(error, CLT_FAILED, "memory is short to average a picture over %d cells", width);
   }
-  free(sums);
-  free(columns);
-  return ready ? CLT_OK : clt_fail(error, CLT_FAILED, "memory is short to average a picture over %d cells", width);
+  free(self.sums);
+  free(self.columns);
+  return status;
 }
 
 /* A code is the number of thresholds, the light halfway between two codes, that lie below. */

@@ -11,8 +11,6 @@
  * over the area of cell (x, y), for the channels c = R, G, B. content[(y * content_width + x) * 3 + c]. */
 clt_status clt_cell_means(const uint8_t *content, int content_width, int content_height, int width, int height,
                           float *means, clt_error *error);
-/* The light of each of the 256 codes. */
-void clt_srgb_light(float light[256]);
 /* The other way: codes[3 k + c] of the light[c * count + k], rounded. */
 void clt_srgb_codes(const float *light, size_t count, uint8_t *codes);
 

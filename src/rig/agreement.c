@@ -17,8 +17,11 @@ clt_status clt_agreement_init(clt_agreement *agreement, int width, int height, i
                                .height = height,
                                .rate = clt_alloc(2 * cells, sizeof *agreement->rate),
                                .variance = clt_alloc(2 * cells, sizeof *agreement->variance),
+                               .bias = clt_alloc(2 * cells, sizeof *agreement->bias),
+                               .dazzled = clt_alloc(cells, sizeof *agreement->dazzled),
                                .doubtful = clt_alloc(cells * (size_t)channels, sizeof *agreement->doubtful)};
-  if (agreement->rate == NULL || agreement->variance == NULL || agreement->doubtful == NULL) {
+  if (agreement->rate == NULL || agreement->variance == NULL || agreement->bias == NULL || agreement->dazzled == NULL ||
+      agreement->doubtful == NULL) {
     clt_agreement_finish(agreement);
     return clt_fail(error, CLT_FAILED, "out of memory for comparing exposures of %zu cells", cells);
   }
@@ -28,14 +31,16 @@ clt_status clt_agreement_init(clt_agreement *agreement, int width, int height, i
 void clt_agreement_finish(clt_agreement *agreement) {
   free(agreement->rate);
   free(agreement->variance);
+  free(agreement->bias);
+  free(agreement->dazzled);
   free(agreement->doubtful);
   *agreement = (clt_agreement){0};
 }
 
-/* Rates of a channel by one exposure. A saturated value has the least rate that it proves and a variance of -1; one
- * that is not seen is NaN. */
-static void read_rates(const clt_agreement *agreement, const clt_merge *merge, int exposure, int channel, float *rate,
-                       float *variance) {
+/* Rates of a channel by one exposure, to one half of the arrays. A saturated value has the least rate that it proves
+ * and a variance of -1; one that is not seen is NaN. */
+static void read_rates(const clt_agreement *agreement, const clt_merge *merge, int exposure, int channel, size_t half) {
+  float *rate = agreement->rate + half, *variance = agreement->variance + half, *bias = agreement->bias + half;
   size_t cells = (size_t)agreement->width * (size_t)agreement->height;
   const clt_merge_sum *sums =
       merge->sums + ((size_t)exposure * (size_t)merge->camera.channels + (size_t)channel) * cells;
@@ -46,6 +51,7 @@ static void read_rates(const clt_agreement *agreement, const clt_merge *merge, i
     double e = (whole ? (double)sums[i].light : (double)merge->light[(int)(sums[i].raw + 0.5f)]) / t;
     rate[i] = seen ? (float)e : NAN;
     variance[i] = whole ? (float)clt_merge_variance(merge, &sums[i], t, e) : -1;
+    bias[i] = whole ? (float)clt_merge_bias(merge, &sums[i], t, e) : 0;
   }
 }
 
@@ -62,15 +68,16 @@ static float brightest_beside(const clt_agreement *agreement, int x, int y) {
   return most;
 }
 
-static bool contradict(double a, double b, double variance, double beside) {
-  return fabs(a - b) > DEVIATIONS * sqrt(variance) + TOLERANCE * beside;
+static bool contradict(double apart, double variance, double bias, double beside) {
+  return fabs(apart) > DEVIATIONS * sqrt(variance) + bias + TOLERANCE * beside;
 }
 
-/* Values of one row that contradict each other, marked; where none does, 1 where the row's sum does. */
+/* Values of one row that contradict each other, marked; where none does, 1 where the sum of those does that nothing
+ * dazzles. */
 static size_t check_row(const clt_agreement *agreement, int y, uint8_t *doubtful) {
   size_t cells = (size_t)agreement->width * (size_t)agreement->height, bad = 0;
   const float *rate = agreement->rate, *variance = agreement->variance;
-  double sum[2] = {0, 0}, sum_variance = 0;
+  double sum[2] = {0, 0}, sum_variance = 0, sum_bias = 0;
   for (int x = 0; x < agreement->width; x++) {
     size_t i = (size_t)y * (size_t)agreement->width + (size_t)x, j = cells + i;
     bool open_a = variance[i] < 0, open_b = variance[j] < 0;
@@ -80,26 +87,58 @@ static size_t check_row(const clt_agreement *agreement, int y, uint8_t *doubtful
     if (isnan(rate[i]) || !apart) {
       continue;
     }
-    double own = fmax((double)rate[i], (double)rate[j]);
-    bool here = contradict((double)rate[i], (double)rate[j], both, own) &&
-                contradict((double)rate[i], (double)rate[j], both, (double)brightest_beside(agreement, x, y));
+    double own = fmax((double)rate[i], (double)rate[j]), off = (double)rate[i] - (double)rate[j];
+    double bias = (double)agreement->bias[i] + (double)agreement->bias[j];
+    bool here =
+        contradict(off, both, bias, own) && contradict(off, both, bias, (double)brightest_beside(agreement, x, y));
     doubtful[i] |= here;
     bad += here;
-    if (!open_a && !open_b) {
+    if (!agreement->dazzled[i]) {
       sum[0] += (double)rate[i];
       sum[1] += (double)rate[j];
       sum_variance += both;
+      sum_bias += bias;
     }
   }
-  bool row = contradict(sum[0], sum[1], sum_variance, fmax(sum[0], sum[1]));
+  bool row = contradict(sum[0] - sum[1], sum_variance, sum_bias, fmax(sum[0], sum[1]));
   return bad > 0 ? bad : (size_t)row;
+}
+
+static bool saturates(const clt_merge *merge, int exposure, size_t cells, size_t i) {
+  const clt_merge_sum *sum = merge->sums + (size_t)exposure * (size_t)merge->camera.channels * cells + i;
+  bool full = false;
+  for (int c = 0; c < merge->camera.channels; c++) {
+    full = full || sum[(size_t)c * cells].count == 0;
+  }
+  return full && merge->footprints->start[i + 1] > merge->footprints->start[i];
+}
+
+/* What a saturated pixel gives to those beside is not proportional to its light: the colour differences that it shares
+ * with them, charge that overflows. */
+static void find_dazzled(clt_agreement *agreement, const clt_merge *merge, int a, int b) {
+  int width = agreement->width, height = agreement->height;
+  size_t cells = (size_t)width * (size_t)height;
+  memset(agreement->dazzled, 0, cells);
+  for (int y = 0; y < height; y++) {
+    for (int x = 0; x < width; x++) {
+      size_t i = (size_t)y * (size_t)width + (size_t)x;
+      if (!saturates(merge, a, cells, i) && !saturates(merge, b, cells, i)) {
+        continue;
+      }
+      for (int v = y > 0 ? y - 1 : 0; v <= y + 1 && v < height; v++) {
+        int left = x > 0 ? x - 1 : 0, right = x + 1 < width ? x + 1 : x;
+        memset(agreement->dazzled + (size_t)v * (size_t)width + left, 1, (size_t)(right - left + 1));
+      }
+    }
+  }
 }
 
 static size_t check_pair(clt_agreement *agreement, const clt_merge *merge, int a, int b) {
   size_t cells = (size_t)agreement->width * (size_t)agreement->height, bad = 0;
+  find_dazzled(agreement, merge, a, b);
   for (int c = 0; c < merge->camera.channels; c++) {
-    read_rates(agreement, merge, a, c, agreement->rate, agreement->variance);
-    read_rates(agreement, merge, b, c, agreement->rate + cells, agreement->variance + cells);
+    read_rates(agreement, merge, a, c, 0);
+    read_rates(agreement, merge, b, c, cells);
     for (int y = 0; y < agreement->height; y++) {
       bad += check_row(agreement, y, agreement->doubtful + (size_t)c * cells);
     }

@@ -8,10 +8,11 @@
 
 /* Workspace; a zeroed one is valid and empty. */
 typedef struct clt_agreement {
-  int width, height; /* of the grid */
-  float *rate;       /* of both exposures, [(exposure * height + y) * width + x] */
-  float *variance;
-  uint8_t *doubtful; /* values [c * cells + i] that contradicted each other when last looked at */
+  int width, height;      /* of the grid */
+  float *rate;            /* of both exposures, [(exposure * height + y) * width + x] */
+  float *variance, *bias; /* likewise */
+  uint8_t *dazzled;       /* cells that a channel of either exposure saturates in, or in a cell beside */
+  uint8_t *doubtful;      /* values [c * cells + i] that contradicted each other when last looked at */
 } clt_agreement;
 
 clt_status clt_agreement_init(clt_agreement *agreement, int width, int height, int channels, clt_error *error);

@@ -105,6 +105,38 @@ double clt_merge_variance(const clt_merge *merge, const clt_merge_sum *sum, doub
   return sample / (t * t * sum->count);
 }
 
+/* h at a code value that need not be whole. */
+static double light_at(const clt_merge *merge, double code) {
+  int top = (1 << merge->camera.bits) - 1;
+  double at = fmin(fmax(code, 0), top);
+  int low = at < top ? (int)at : top - 1;
+  return (double)merge->light[low] + (at - low) * ((double)merge->light[low + 1] - (double)merge->light[low]);
+}
+
+/* What rounding to the camera's steps shifts the mean of samples at a code value, noise in units of h. */
+static double rounding(const clt_merge *merge, double code, double noise) {
+  double half = light_at(merge, code + 0.5 * fmax(merge->camera.step, 1)) - light_at(merge, code);
+  double steps = noise / fmax(2 * half, 1e-12);
+  return half * exp(-2 * M_PI * M_PI * steps * steps);
+}
+
+/* What noise gains that is cut off at the end of the scale, for any light that may have come out as this mean: the gain
+ * is most at the end itself, where it is so many deviations. */
+static double cut_off(double above, double noise) {
+  const double most = 1 / sqrt(2 * M_PI);
+  double z = fmax(above / noise - most, 0);
+  return noise * (most * exp(-0.5 * z * z) - 0.5 * z * erfc(z / sqrt(2)));
+}
+
+double clt_merge_bias(const clt_merge *merge, const clt_merge_sum *sum, double t, double e) {
+  const clt_camera_info *camera = &merge->camera;
+  double light = fmax(e, 0) * t, read = camera->read_noise / camera->full_well;
+  double noise = sqrt(light / camera->full_well + read * read + 1e-18);
+  return (rounding(merge, (double)sum->raw, noise) + rounding(merge, camera->black_level, read) +
+          cut_off(light - (double)merge->light[0], noise)) /
+         t;
+}
+
 /* The rate that two exposures prove at the least; 0 where only one shows light, which may be a frame of another
  * pattern.
  */

@@ -48,5 +48,10 @@ void clt_merge_radiance(const clt_merge *merge, clt_image *radiance, clt_image *
 
 /* Variance of the rate that one exposure of t seconds gives a value, were the rate e. */
 double clt_merge_variance(const clt_merge *merge, const clt_merge_sum *sum, double t, double e);
+/* The most by which that rate is off for a reason that all samples of the cell share, so that their number is no help:
+ * rounding to steps of the camera, which noise of s steps dithers to at most exp(-2 pi^2 s^2) / 2 steps (Widrow and
+ * Kollar, Quantization Noise, 2008), in the sample and in the black level; and noise that is cut off at code 0, whose
+ * mean is too high by s (phi(z) - z Q(z)) where the light lies z deviations above. */
+double clt_merge_bias(const clt_merge *merge, const clt_merge_sum *sum, double t, double e);
 
 #endif

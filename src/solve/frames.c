@@ -2,7 +2,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/clock.h"
 #include "base/memory.h"
@@ -12,7 +11,8 @@
 
 enum { COLOURS = 3 };
 
-static const double GAIN_MOST = 4, SMOOTH_S = 0.5;
+static const float GAIN_MOST = 4;
+static const double SMOOTH_S = 0.5;
 /* A cut changes the picture by more than this part of its light. */
 static const double CUT = 0.3;
 
@@ -23,10 +23,13 @@ struct clt_frames {
   clt_live *live;
   clt_mapping *mapping; /* NULL: scale 1, offset 0 */
   double white[CLT_CHANNELS_MAX];
-  float *means;            /* of the content: three colours */
+  size_t values;           /* channels * cells */
+  float *direct;           /* 1 / F, 0 at dark cells */
+  float *means;            /* of the content: three colours, where the transport has one channel */
   float *picture, *before; /* the channels of this frame and of the one before */
   float *target, *drive;
   float *then_target, *then_drive; /* of the last frame that was solved for */
+  const float *shown;              /* the drive of the last frame: one of the two */
 };
 
 static clt_status find_white(clt_frames *self, const clt_white *white, clt_error *error) {
@@ -40,19 +43,34 @@ static clt_status find_white(clt_frames *self, const clt_white *white, clt_error
   return CLT_OK;
 }
 
+static void find_direct(clt_frames *self) {
+  size_t cells = self->info.cols;
+  for (int c = 0; c < self->info.channels; c++) {
+    const unsigned char *lit = clt_certificate_lit(self->certificate, c);
+    const double *f = clt_certificate_first_bounce(self->certificate, c);
+    for (size_t i = 0; i < cells; i++) {
+      self->direct[(size_t)c * cells + i] = lit[i] ? (float)(1 / f[i]) : 0;
+    }
+  }
+}
+
 static clt_status prepare(clt_frames *self, const clt_frames_options *options, clt_error *error) {
   size_t cells = self->info.cols, values = (size_t)self->info.channels * cells;
-  float *work = clt_alloc(COLOURS * cells + 6 * values, sizeof *work);
+  float *work = clt_alloc(COLOURS * cells + 7 * values, sizeof *work);
   if (work == NULL) {
     return clt_fail(error, CLT_FAILED, "no memory for moving pictures of %zu cells", cells);
   }
+  self->values = values;
   self->means = work;
-  self->picture = work + COLOURS * cells;
+  self->direct = work + COLOURS * cells;
+  self->picture = self->direct + values;
   self->before = self->picture + values;
   self->target = self->before + values;
   self->drive = self->target + values;
   self->then_target = self->drive + values;
   self->then_drive = self->then_target + values;
+  self->shown = self->drive;
+  find_direct(self);
   clt_status status = find_white(self, &options->white, error);
   if (status == CLT_OK) {
     status = clt_live_create(self->transport, self->certificate, &options->live, &self->live, error);
@@ -93,33 +111,40 @@ void clt_frames_destroy(clt_frames *self) {
 }
 
 /* The picture's channels; a transport of one takes the luminance (Rec. 709). The one before is kept. */
-static void take_picture(clt_frames *self) {
-  size_t cells = self->info.cols;
-  float *older = self->before;
+static clt_status take_picture(clt_frames *self, const uint8_t *content, int width, int height, clt_error *error) {
+  const size_t cells = self->info.cols;
+  const bool colours = self->info.channels == COLOURS;
   const float *red = self->means, *green = red + cells, *blue = green + cells;
+  float *picture = self->before;
+  clt_status status = clt_cell_means(content, width, height, self->info.width, self->info.height,
+                                     colours ? picture : self->means, error);
+  if (status != CLT_OK) {
+    return status;
+  }
   self->before = self->picture;
-  self->picture = older;
-  if (self->info.channels == COLOURS) {
-    memcpy(self->picture, self->means, COLOURS * cells * sizeof(float));
-    return;
+  self->picture = picture;
+  for (size_t i = 0; !colours && i < cells; i++) {
+    picture[i] = 0.2126F * red[i] + 0.7152F * green[i] + 0.0722F * blue[i];
   }
-  for (size_t i = 0; i < cells; i++) {
-    self->picture[i] = 0.2126F * red[i] + 0.7152F * green[i] + 0.0722F * blue[i];
-  }
+  return CLT_OK;
 }
 
+/* This pass and those below are done sooner than a thread comes that others keep from its processor. */
 static bool is_cut(const clt_frames *self) {
+  const float *picture = self->picture, *before = self->before;
   double change = 0, light = 0;
-  for (size_t i = 0; i < (size_t)self->info.channels * self->info.cols; i++) {
-    change += fabs((double)self->picture[i] - (double)self->before[i]);
-    light += fmax((double)self->picture[i], (double)self->before[i]);
+#pragma omp simd reduction(+ : change, light)
+  for (size_t i = 0; i < self->values; i++) {
+    const double now = (double)picture[i], then = (double)before[i];
+    change += fabs(now - then);
+    light += now > then ? now : then;
   }
   return change > CUT * light;
 }
 
 /* target = white (scale picture + offset). False while scale and offset are on their way. */
 static bool map(clt_frames *self, double seconds, clt_frames_result *result) {
-  size_t cells = self->info.cols;
+  const size_t cells = self->info.cols;
   bool moves = false;
   result->cut = is_cut(self);
   result->scale = 1;
@@ -129,9 +154,10 @@ static bool map(clt_frames *self, double seconds, clt_frames_result *result) {
     result->offset = clt_mapping_offset(self->mapping);
   }
   for (int c = 0; c < self->info.channels; c++) {
-    float factor = (float)(self->white[c] * result->scale), more = (float)(self->white[c] * result->offset);
+    const float factor = (float)(self->white[c] * result->scale), more = (float)(self->white[c] * result->offset);
     const float *picture = self->picture + (size_t)c * cells;
     float *target = self->target + (size_t)c * cells;
+#pragma omp simd
     for (size_t i = 0; i < cells; i++) {
       target[i] = factor * picture[i] + more;
     }
@@ -141,20 +167,24 @@ static bool map(clt_frames *self, double seconds, clt_frames_result *result) {
 
 /* Without a step the solver gives the drive of an older frame. From nothing this is the uncompensated picture. */
 static void follow_directly(clt_frames *self) {
-  size_t cells = self->info.cols;
-  for (int c = 0; c < self->info.channels; c++) {
-    const unsigned char *lit = clt_certificate_lit(self->certificate, c);
-    const double *f = clt_certificate_first_bounce(self->certificate, c);
-    for (size_t i = 0, at = (size_t)c * cells; i < cells; i++, at++) {
-      double change = lit[i] ? (double)(self->target[at] - self->then_target[at]) / f[i] : 0;
-      self->drive[at] = (float)fmin(fmax((double)self->then_drive[at] + change, 0), 1);
-    }
+  const float *target = self->target, *then_target = self->then_target, *then_drive = self->then_drive;
+  float *drive = self->drive;
+#pragma omp simd
+  for (size_t i = 0; i < self->values; i++) {
+    float x = then_drive[i] + (target[i] - then_target[i]) * self->direct[i];
+    x = x > 0 ? x : 0;
+    drive[i] = x < 1 ? x : 1;
   }
+}
+
+static void swap(float **a, float **b) {
+  float *other = *a;
+  *a = *b;
+  *b = other;
 }
 
 /* The drive of this frame: solved for, or as near as no time allows. */
 static clt_status solve(clt_frames *self, clt_frames_result *result, clt_error *error) {
-  size_t values = (size_t)self->info.channels * self->info.cols;
   clt_status status = clt_live_solve(self->live, self->target, self->drive, &result->live, error);
   if (status != CLT_OK) {
     return status;
@@ -162,24 +192,27 @@ static clt_status solve(clt_frames *self, clt_frames_result *result, clt_error *
   result->direct = !result->live.converged && result->live.steps == 0;
   if (result->direct) {
     follow_directly(self);
+    self->shown = self->drive;
   } else {
-    memcpy(self->then_target, self->target, values * sizeof(float));
-    memcpy(self->then_drive, self->drive, values * sizeof(float));
+    swap(&self->target, &self->then_target);
+    swap(&self->drive, &self->then_drive);
+    self->shown = self->then_drive;
   }
   return CLT_OK;
 }
 
 static void fill_fields(const clt_frames *self, double scale, float *gain, float *offset) {
-  size_t cells = self->info.cols;
+  const size_t cells = self->info.cols;
   for (int k = 0; k < COLOURS; k++) {
-    int c = k < self->info.channels ? k : 0;
-    const unsigned char *lit = clt_certificate_lit(self->certificate, c);
-    const double *f = clt_certificate_first_bounce(self->certificate, c);
-    const float *picture = self->picture + (size_t)c * cells, *drive = self->drive + (size_t)c * cells;
-    size_t at = (size_t)k * cells;
+    const int c = k < self->info.channels ? k : 0;
+    const float factor = (float)(scale * self->white[c]);
+    const size_t from = (size_t)c * cells, to = (size_t)k * cells;
+    const float *direct = self->direct + from, *picture = self->picture + from, *drive = self->shown + from;
+#pragma omp simd
     for (size_t i = 0; i < cells; i++) {
-      gain[at + i] = lit[i] ? (float)fmin(scale * self->white[c] / f[i], GAIN_MOST) : 0;
-      offset[at + i] = lit[i] ? drive[i] - gain[at + i] * picture[i] : 0;
+      const float whole = factor * direct[i], own = whole < GAIN_MOST ? whole : GAIN_MOST;
+      gain[to + i] = own;
+      offset[to + i] = direct[i] > 0 ? drive[i] - own * picture[i] : 0;
     }
   }
 }
@@ -196,11 +229,10 @@ clt_status clt_frames_next(clt_frames *self, const uint8_t *content, int width, 
                            float *offset, clt_frames_result *result, clt_error *error) {
   int64_t start_ns = clt_clock_ns();
   *result = (clt_frames_result){0};
-  clt_status status = clt_cell_means(content, width, height, self->info.width, self->info.height, self->means, error);
+  clt_status status = take_picture(self, content, width, height, error);
   if (status != CLT_OK) {
     return status;
   }
-  take_picture(self);
   result->ms[CLT_FRAMES_MEAN] = lap(&start_ns);
   bool still = map(self, seconds, result);
   result->ms[CLT_FRAMES_MAP] = lap(&start_ns);
@@ -215,7 +247,7 @@ clt_status clt_frames_next(clt_frames *self, const uint8_t *content, int width, 
 }
 
 const float *clt_frames_drive(const clt_frames *self) {
-  return self->drive;
+  return self->shown;
 }
 
 void clt_frames_set_budget(clt_frames *self, double budget_ms) {

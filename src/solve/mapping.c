@@ -23,10 +23,11 @@ struct clt_mapping {
   const clt_transport *transport;
   const clt_certificate *certificate;
   clt_transport_info info;
-  double white[CLT_CHANNELS_MAX], omega[CLT_CHANNELS_MAX];
-  double smooth_s, fast_s;                                        /* fast_s: left of the time after a cut */
-  double *p, *w, *b;                                              /* channels * cells each */
-  double *product;                                                /* cells */
+  double white[CLT_CHANNELS_MAX];
+  double smooth_s, fast_s;   /* fast_s: left of the time after a cut */
+  double *p, *w, *b;         /* channels * cells each */
+  double *way, *lift, *room; /* as many: omega / F, 1 / w (w > 0) and 1 / (1 + b), each 0 at dark cells */
+  double *product;           /* cells */
   double offset_of[CLT_CHANNELS_MAX], scale_of[CLT_CHANNELS_MAX]; /* that a channel needs */
   double moved_of[CLT_CHANNELS_MAX]; /* the largest change of its p in its last step, of drive */
   int turn;                          /* the channel whose p is next */
@@ -44,6 +45,21 @@ static clt_status solve_unbounded(clt_mapping *self, const double *wanted, doubl
   return clt_solve(self->transport, self->certificate, wanted, &options, x, &result, error);
 }
 
+/* What a frame would divide by. */
+static void find_factors(clt_mapping *self) {
+  size_t cells = self->info.cols;
+  for (int c = 0; c < self->info.channels; c++) {
+    const unsigned char *lit = clt_certificate_lit(self->certificate, c);
+    const double *f = clt_certificate_first_bounce(self->certificate, c);
+    double rho = clt_certificate_channel(self->certificate, c)->radius_high, m = rho / (1 + rho);
+    for (size_t i = 0, at = (size_t)c * cells; i < cells; i++, at++) {
+      self->way[at] = lit[i] ? (1 - m * m) / f[i] : 0;
+      self->lift[at] = lit[i] && self->w[at] > 0 ? 1 / self->w[at] : 0;
+      self->room[at] = lit[i] && self->b[at] > -1 ? 1 / (1 + self->b[at]) : 0;
+    }
+  }
+}
+
 static clt_status prepare(clt_mapping *self, clt_error *error) {
   size_t cells = self->info.cols, values = (size_t)self->info.channels * cells;
   double *wanted = clt_alloc(values, sizeof *wanted);
@@ -59,18 +75,20 @@ static clt_status prepare(clt_mapping *self, clt_error *error) {
   }
   status = status == CLT_OK ? solve_unbounded(self, wanted, self->b, error) : status;
   free(wanted);
+  find_factors(self);
   return status;
 }
 
 static clt_status allocate(clt_mapping *self, clt_error *error) {
   size_t cells = self->info.cols, values = (size_t)self->info.channels * cells;
-  self->p = clt_alloc(values, sizeof(double));
-  self->w = clt_alloc(values, sizeof(double));
-  self->b = clt_alloc(values, sizeof(double));
-  self->product = clt_alloc(cells, sizeof(double));
-  return self->p && self->w && self->b && self->product
-             ? prepare(self, error)
-             : clt_fail(error, CLT_FAILED, "a target mapping: out of memory");
+  self->p = clt_alloc(6 * values + cells, sizeof *self->p);
+  self->w = self->p + values;
+  self->b = self->w + values;
+  self->way = self->b + values;
+  self->lift = self->way + values;
+  self->room = self->lift + values;
+  self->product = self->room + values;
+  return self->p != NULL ? prepare(self, error) : clt_fail(error, CLT_FAILED, "a target mapping: out of memory");
 }
 
 clt_status clt_mapping_create(const clt_transport *transport, const clt_certificate *certificate, const double *white,
@@ -86,9 +104,7 @@ clt_status clt_mapping_create(const clt_transport *transport, const clt_certific
                         .fast_s = CUT_S,
                         .scale = 1};
   for (int c = 0; c < self->info.channels; c++) {
-    double rho = clt_certificate_channel(certificate, c)->radius_high, m = rho / (1 + rho);
     self->white[c] = white[c];
-    self->omega[c] = 1 - m * m;
     self->scale_of[c] = self->moved_of[c] = 1;
   }
   clt_status status = allocate(self, error);
@@ -103,52 +119,44 @@ clt_status clt_mapping_create(const clt_transport *transport, const clt_certific
 void clt_mapping_destroy(clt_mapping *self) {
   if (self != NULL) {
     free(self->p);
-    free(self->w);
-    free(self->b);
-    free(self->product);
     free(self);
   }
 }
 
 /* One damped step of a channel's p. */
 static void step(clt_mapping *self, int c, const float *picture) {
-  size_t cells = self->info.cols, at = (size_t)c * cells;
-  const unsigned char *lit = clt_certificate_lit(self->certificate, c);
-  const double *f = clt_certificate_first_bounce(self->certificate, c);
+  const size_t cells = self->info.cols, at = (size_t)c * cells;
+  const double *way = self->way + at, *product = self->product, white = self->white[c];
   double *p = self->p + at, moved = 0;
+  picture += at;
   clt_transport_apply(self->transport, c, p, self->product);
   for (size_t i = 0; i < cells; i++) {
-    if (lit[i]) {
-      double change = self->omega[c] * (self->white[c] * (double)picture[at + i] - self->product[i]) / f[i];
-      p[i] += change;
-      moved = fmax(moved, fabs(change));
-    }
+    const double change = way[i] * (white * (double)picture[i] - product[i]), far = fabs(change);
+    p[i] += change;
+    moved = far > moved ? far : moved;
   }
   self->moved_of[c] = moved;
 }
 
-/* The offset and the scale that a channel needs. */
+/* The offset that a channel needs, and with one for all, or greys would be tinted, the scale. */
 static void need(clt_mapping *self, int c) {
-  size_t cells = self->info.cols, at = (size_t)c * cells;
-  const unsigned char *lit = clt_certificate_lit(self->certificate, c);
-  const double *p = self->p + at, *w = self->w + at, *b = self->b + at;
-  double offset = 0, scale = 1;
+  const size_t cells = self->info.cols, at = (size_t)c * cells;
+  const double *p = self->p + at, *w = self->w + at, *b = self->b + at, *lift = self->lift + at;
+  const double *room = self->room + at, larger = 1 / self->scale;
+  double offset = 0, most = 1;
   for (size_t i = 0; i < cells; i++) {
-    if (lit[i] && w[i] > 0) {
-      offset = fmax(offset, (b[i] / self->scale - p[i]) / w[i]);
-    }
+    const double own = (larger * b[i] - p[i]) * lift[i];
+    offset = own > offset ? own : offset;
   }
   self->offset_of[c] = offset;
   for (int k = 0; k < self->info.channels; k++) {
-    offset = fmax(offset, self->offset_of[k]); /* one for all, or greys would be tinted */
+    offset = fmax(offset, self->offset_of[k]);
   }
   for (size_t i = 0; i < cells; i++) {
-    double drive = p[i] + offset * w[i];
-    if (lit[i] && drive > 0) {
-      scale = fmin(scale, (1 + b[i]) / drive);
-    }
+    const double full = (p[i] + offset * w[i]) * room[i];
+    most = full > most ? full : most;
   }
-  self->scale_of[c] = scale;
+  self->scale_of[c] = 1 / most;
 }
 
 static bool approach(double *value, double wanted, double part) {

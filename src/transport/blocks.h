@@ -23,6 +23,7 @@ typedef struct clt_block_storage {
   int64_t *start;                         /* N + 1: near by compressed rows; every channel has the same pattern */
   int32_t *cell;                          /* entries */
   float *value;                           /* channels x entries */
+  size_t reach;                           /* the most that the numbers of two cells with a near entry differ by */
   double *inverse;                        /* K: 1 / D_b; 0 for a block without flux */
   double *scratch;                        /* per channel: room for a product; see blocks.c */
   pthread_mutex_t turn[CLT_CHANNELS_MAX]; /* products of one channel take turns */

@@ -56,6 +56,17 @@ static clt_status begin(clt_transport *transport, size_t count, const char *sour
   return clt_transport_set_rows(transport, transport->cols, source, error);
 }
 
+static size_t find_reach(const clt_block_storage *own, size_t cells) {
+  int64_t reach = 0;
+  for (size_t i = 0; i < cells; i++) {
+    for (int64_t e = own->start[i]; e < own->start[i + 1]; e++) {
+      const int64_t apart = llabs((int64_t)own->cell[e] - (int64_t)i);
+      reach = apart > reach ? apart : reach;
+    }
+  }
+  return (size_t)reach;
+}
+
 /* Makes storage that has all its arrays ready for products. */
 static clt_status finish(clt_transport *transport, size_t entries, const char *source, clt_error *error) {
   clt_block_storage *own = transport->storage;
@@ -67,6 +78,7 @@ static clt_status finish(clt_transport *transport, size_t entries, const char *s
   if (status != CLT_OK) {
     return status;
   }
+  own->reach = find_reach(own, cells);
   own->inverse = clt_alloc(own->count, sizeof *own->inverse);
   own->scratch = clt_alloc(clt_block_scratch(cells, own->count), channels * sizeof *own->scratch);
   if (own->inverse == NULL || own->scratch == NULL) {

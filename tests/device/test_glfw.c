@@ -254,6 +254,37 @@ static void test_live(void **state) {
   test_display_stop(&display);
 }
 
+/* Content of another size goes by a program of its own. Of one colour its light is the same however it is stretched. */
+static void test_stretched(void **state) {
+  (void)state;
+  enum { SEEDS = 6, PIXELS = LIVE_WIDTH * LIVE_HEIGHT };
+  static uint8_t content[LIVE_VALUES];
+  static float gain[3 * GRID_WIDTH * GRID_HEIGHT], offset[3 * GRID_WIDTH * GRID_HEIGHT], codes[LIVE_VALUES];
+  static uint16_t got[LIVE_VALUES];
+  test_display display = {0};
+  clt_error error = {0};
+  int64_t shown_ns;
+  assert_true(test_display_xvfb("160x120x24", &display));
+  clt_projector *projector = open_projector(0, 0, false);
+  for (uint32_t seed = 1; seed <= SEEDS; seed++) {
+    clt_live_picture picture = draw_live(seed, content, gain, offset);
+    picture.width = (int)(7 * seed);
+    picture.height = (int)(50 / seed);
+    picture.seed = seed;
+    for (int i = 3; i < 3 * picture.width * picture.height; i++) {
+      content[i] = content[i % 3];
+    }
+    assert_ok(clt_live_encode(&picture, 3, LIVE_HEIGHT, LIVE_WIDTH, codes, &error), error);
+    assert_ok(projector->driver->present_live(projector, &picture, &shown_ns, &error), error);
+    test_display_grab(&display, 0, 0, LIVE_WIDTH, LIVE_HEIGHT, got);
+    for (int i = 0; i < LIVE_VALUES; i++) {
+      assert_true(fabs((double)got[i] - 255 * (double)codes[i % 3 * PIXELS + i / 3]) < 1.05);
+    }
+  }
+  projector->driver->close(projector);
+  test_display_stop(&display);
+}
+
 static long resident_kib(void) {
   FILE *file = fopen("/proc/self/statm", "r");
   long size, resident = 0;
@@ -293,9 +324,9 @@ int main(void) {
     return TEST_SKIPPED;
   }
   test_display_stop(&display);
-  const struct CMUnitTest tests[] = {cmocka_unit_test(test_levels),  cmocka_unit_test(test_ten_bits),
-                                     cmocka_unit_test(test_window),  cmocka_unit_test(test_pace),
-                                     cmocka_unit_test(test_manners), cmocka_unit_test(test_live),
-                                     cmocka_unit_test(test_memory)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_levels),    cmocka_unit_test(test_ten_bits),
+                                     cmocka_unit_test(test_window),    cmocka_unit_test(test_pace),
+                                     cmocka_unit_test(test_manners),   cmocka_unit_test(test_live),
+                                     cmocka_unit_test(test_stretched), cmocka_unit_test(test_memory)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -410,6 +410,43 @@ static void jpeg_is_read(void **state) {
   free(bytes);
 }
 
+/* Codes of Y'CbCr before rounding. */
+static void codes_of(const clt_picture_layout *layout, const double rgb[3], double code[3]) {
+  static const double weight[4][2] = {{0.299, 0.114}, {0.2126, 0.0722}, {0.2627, 0.0593}, {0.212, 0.087}};
+  double kr = weight[layout->matrix][0], kb = weight[layout->matrix][1];
+  double y = kr * rgb[0] + (1 - kr - kb) * rgb[1] + kb * rgb[2], range = layout->limited ? 224 : 255;
+  code[0] = layout->limited ? 16 + 219 * y : 255 * y;
+  code[1] = 128 + range * (rgb[2] - y) / (2 - 2 * kb);
+  code[2] = 128 + range * (rgb[0] - y) / (2 - 2 * kr);
+}
+
+/* Half a step is as far as rounding moves any channel, and random colours come near it. */
+static void steps_are_twice_what_rounding_moves(void **state) {
+  (void)state;
+  uint64_t random = 11;
+  for (int k = 0; k < LAYOUTS; k++) {
+    double half = 0.5 * clt_pixels_step(find("YUYV", false), &layouts[k]) / 1023, worst = 0;
+    for (int n = 0; n < 20000; n++) {
+      double rgb[3], exact[3], back[3];
+      for (int c = 0; c < 3; c++) {
+        rgb[c] = test_random(&random);
+      }
+      codes_of(&layouts[k], rgb, exact);
+      const int code[3] = {(int)lrint(exact[0]), (int)lrint(exact[1]), (int)lrint(exact[2])};
+      colour_of(&layouts[k], code, back);
+      for (int c = 0; c < 3; c++) {
+        worst = fmax(worst, fabs(back[c] - rgb[c]));
+      }
+    }
+    assert_true(worst <= half * 1.0001 && worst > 0.9 * half);
+  }
+  assert_near(clt_pixels_step(find("GREY", false), &layouts[0]), 1, 0);
+  assert_near(clt_pixels_step(find("RGB3", false), &layouts[1]), 1, 0);
+  assert_near(clt_pixels_step(find("RGB3", false), &layouts[0]), 255.0 / 219, 1e-12);
+  assert_near(clt_pixels_step(find("RGGB", false), &layouts[1]), 1023.0 / 255, 1e-12);
+  assert_near(clt_pixels_step(find("MJPG", false), &layouts[0]), 1 + 1.772, 1e-6);
+}
+
 /* No code stands twice in the table, and every entry is one that the tests above name. */
 static void table_is_tested(void **state) {
   (void)state;
@@ -425,8 +462,13 @@ static void table_is_tested(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(words_are_read),  cmocka_unit_test(pairs_are_read),   cmocka_unit_test(planes_are_read),
-      cmocka_unit_test(grey_is_read),    cmocka_unit_test(mosaics_are_read), cmocka_unit_test(jpeg_is_read),
+      cmocka_unit_test(words_are_read),
+      cmocka_unit_test(pairs_are_read),
+      cmocka_unit_test(planes_are_read),
+      cmocka_unit_test(grey_is_read),
+      cmocka_unit_test(mosaics_are_read),
+      cmocka_unit_test(jpeg_is_read),
+      cmocka_unit_test(steps_are_twice_what_rounding_moves),
       cmocka_unit_test(table_is_tested),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

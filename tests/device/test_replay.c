@@ -51,7 +51,8 @@ static void describe_camera(const clt_camera *camera, clt_camera_info *info) {
                             .responsivity = 3.25,
                             .full_well = 8000,
                             .read_noise = 4.5,
-                            .own_pixels = true};
+                            .own_pixels = true,
+                            .step = 12.75};
 }
 
 static clt_status present(clt_projector *projector, const float *codes, int64_t *shown_ns, clt_error *error) {
@@ -171,7 +172,7 @@ static void a_recording_comes_back_sample_by_sample(void **state) {
   assert_true(sensor.exposure_min_s == wanted.exposure_min_s && sensor.exposure_max_s == wanted.exposure_max_s);
   assert_true(sensor.black_level == wanted.black_level && sensor.responsivity == wanted.responsivity);
   assert_true(sensor.full_well == wanted.full_well && sensor.read_noise == wanted.read_noise);
-  assert_int_equal(sensor.own_pixels, wanted.own_pixels);
+  assert_true(sensor.own_pixels == wanted.own_pixels && sensor.step == wanted.step);
   use(projector, camera, 0.3, is);
   for (int k = 0; k < 2 * PATTERNS; k++) {
     assert_int_equal(is[k].shown_ns, was[k].shown_ns);
@@ -267,6 +268,17 @@ static void damaged_recordings_are_refused_with_file_and_line(void **state) {
     put(path, changed, size);
     assert_int_equal(clt_replay_open(recording, &projector, &camera, &error), CLT_BAD_INPUT);
   }
+  static char before[sizeof text]; /* as a recording that knows no step */
+  char *known = strstr(text, " 12.75\n");
+  assert_non_null(known);
+  int length = snprintf(before, sizeof before, "%.*s%s", (int)(known - text), text, known + strlen(" 12.75"));
+  put(path, before, (size_t)length);
+  assert_ok(clt_replay_open(recording, &projector, &camera, &error), error);
+  clt_camera_info sensor;
+  camera->driver->describe(camera, &sensor);
+  assert_true(sensor.step == 0 && sensor.own_pixels);
+  camera->driver->close(camera);
+  projector->driver->close(projector);
   put(path, text, size);
   snprintf(path, sizeof path, "%s/frame-000000.png", recording);
   put(path, "\x89PNG\r\n\x1a\nnothing", 15);

@@ -236,6 +236,53 @@ static void a_cell_that_is_not_seen_has_infinite_deviation(void **state) {
   close_bench(&bench);
 }
 
+/* Mean of samples of a camera that rounds to steps and ends at 0, exactly: the sum over its values, each as probable as
+ * normal noise about the mean makes it. */
+static double rounded_mean(double mean, double noise, double step) {
+  double sum = 0;
+  for (int k = 1; step * k <= mean + 10 * noise + step; k++) {
+    double low = (step * (k - 0.5) - mean) / noise, high = (step * (k + 0.5) - mean) / noise;
+    sum += step * k * 0.5 * (erfc(low / sqrt(2)) - erfc(high / sqrt(2)));
+  }
+  return sum;
+}
+
+/* The bias is a bound at any light, noise, step and pedestal, the black level being what the camera itself shows of it;
+ * and no idle one: it is reached to a third or more where noise is small, and vanishes where noise dithers far above 0.
+ */
+static void what_samples_share_is_within_the_bias(void **state) {
+  (void)state;
+  static const double noises[] = {0.02, 0.1, 0.2, 0.35, 0.6, 1.2}, steps[] = {1, 4, 12.8}, pedestals[] = {0, 2.3, 40};
+  for (int n = 0; n < 6 * 3 * 3; n++) {
+    double step = steps[n / 6 % 3], noise = noises[n % 6] * step, pedestal = pedestals[n / 18] * step, worst = 0;
+    merge_bench bench = {0};
+    clt_error error = {0};
+    clt_camera_info coarse = camera;
+    open_bench(&bench, (clt_curve){.kind = CLT_CURVE_LINEAR}, 1);
+    /* As the calibration finds it, which nothing below 0 disturbs. */
+    coarse.black_level = rounded_mean(pedestal + 100 * step, noise, step) - 100 * step;
+    double range = 4095 - coarse.black_level, t = 0.01;
+    coarse.step = step;
+    coarse.full_well = 1e12;
+    coarse.read_noise = noise / range * coarse.full_well;
+    clt_merge_finish(&bench.merge);
+    assert_ok(clt_merge_init(&bench.merge, &coarse, &bench.curve, &bench.footprints, 1, &error), error);
+    for (int k = 0; k <= 400; k++) {
+      double light = 0.02 * step * k, raw = rounded_mean(pedestal + light, noise, step),
+             h = (raw - coarse.black_level) / range;
+      clt_merge_sum sum = {.light = (float)h, .count = 1, .raw = (float)raw};
+      double off = fabs(h - light / range) / t, bias = clt_merge_bias(&bench.merge, &sum, t, h / t);
+      assert_true(off <= bias * 1.001 + 1e-7 / t);
+      worst = fmax(worst, off / bias);
+      if (noises[n % 6] > 1 && pedestal > 30 * step) {
+        assert_true(bias < 1e-9 * step / range / t);
+      }
+    }
+    assert_true(noises[n % 6] > 0.2 || worst > 0.3);
+    close_bench(&bench);
+  }
+}
+
 /* The deviation of a frame belongs to the time that it really had. */
 static void a_real_exposure_time_counts(void **state) {
   (void)state;
@@ -261,6 +308,7 @@ int main(void) {
       cmocka_unit_test(one_hot_pixel_does_not_spoil_its_cell),
       cmocka_unit_test(nothing_but_saturation_is_a_bound_of_infinite_deviation),
       cmocka_unit_test(a_cell_that_is_not_seen_has_infinite_deviation),
+      cmocka_unit_test(what_samples_share_is_within_the_bias),
       cmocka_unit_test(a_real_exposure_time_counts),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -18,6 +18,7 @@ struct wrapped_camera {
   double strength;
   double fixed_s; /* exposure that it takes whatever is asked for, while its frames tell what was asked for; 0: obeys */
   double asked_s;
+  double step; /* that it tells of; 0: as the inner camera does */
   uint64_t random;
   long frames, faults;
   uint16_t samples[WRAPPED_SAMPLES_MAX];   /* that are delivered, until the trick: as the inner camera's */
@@ -28,6 +29,7 @@ struct wrapped_camera {
 static inline void wrapped_describe(const clt_camera *camera, clt_camera_info *info) {
   const wrapped_camera *self = (const wrapped_camera *)camera;
   self->inner->driver->describe(self->inner, info);
+  info->step = self->step > 0 ? self->step : info->step;
 }
 
 static inline clt_status wrapped_set_exposure(clt_camera *camera, double seconds, clt_error *error) {

@@ -59,11 +59,31 @@ static void test_report(void **unused) {
   assert_true(report.peer[1].error <= options.target_error && report.peer[2].error <= 2 * options.target_error);
   for (int k = 0; k < report.peer_count; k++) {
     const clt_bench_peer *peer = &report.peer[k];
-    assert_true(peer->ms > 0 && peer->warm_ms > 0);
+    assert_true(peer->converged && peer->ms > 0 && peer->warm_ms > 0);
     assert_near(peer->ratio, peer->ms / report.frame.cold_ms, 1e-9 * peer->ratio);
     assert_near(peer->warm_ratio, peer->warm_ms / report.frame.p50_ms, 1e-9 * peer->warm_ratio);
   }
   assert_int_equal(report.point_count, 0);
+  clt_transport_destroy(room);
+}
+
+/* Far light of 1.5 times a cell's own: what diverges is told and not waited for. */
+static void test_divergence(void **unused) {
+  (void)unused;
+  enum { SIDE = 16, N = SIDE * SIDE };
+  clt_transport *room = NULL;
+  clt_bench_report report;
+  clt_error error = {0};
+  const clt_bench_options options = {.frames = 10, .target_error = 0.01};
+  assert_ok(clt_transport_create_dense(SIDE, SIDE, 1, N, &room, &error), error);
+  float *entries = clt_transport_entries(room, 0);
+  for (size_t at = 0; at < N * N; at++) {
+    entries[at] = 1.5f / N + (at % (N + 1) == 0 ? 1.0f : 0.0f);
+  }
+  assert_ok(clt_bench(room, &options, &report, &error), error);
+  assert_string_equal(report.peer[0].name, "report-jacobi-csr-f32");
+  assert_true(!report.peer[0].converged && report.peer[0].ratio == 0);
+  assert_true(report.peer[1].converged && report.peer[1].error <= options.target_error);
   clt_transport_destroy(room);
 }
 
@@ -80,6 +100,6 @@ static void test_refusals(void **unused) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_room), cmocka_unit_test(test_report),
-                                     cmocka_unit_test(test_refusals)};
+                                     cmocka_unit_test(test_divergence), cmocka_unit_test(test_refusals)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

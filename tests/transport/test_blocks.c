@@ -15,14 +15,18 @@ typedef struct known_blocks {
   clt_block_parts parts;
 } known_blocks;
 
-static void draw_cells(known_blocks *own, int cells, int count, uint64_t *state) {
+/* Near entries lie up to `reach` cells apart. */
+static void draw_cells(known_blocks *own, int cells, int count, int reach, uint64_t *state) {
   for (int j = 0; j < cells; j++) {
     own->block[j] = (int32_t)(count * test_random(state));
     own->flux[j] = own->block[j] == 0 ? 0 : (float)(0.2 + test_random(state));
     own->start[j + 1] = own->start[j] + (j % (NEAR + 1));
   }
-  for (int64_t e = 0; e < own->start[cells]; e++) {
-    own->cell[e] = (int32_t)(cells * test_random(state));
+  for (int j = 0; j < cells; j++) {
+    for (int64_t e = own->start[j]; e < own->start[j + 1]; e++) {
+      const int most = cells - 1, at = j - reach + (int)((2 * reach + 1) * test_random(state));
+      own->cell[e] = at < 0 ? 0 : at > most ? most : at;
+    }
   }
 }
 
@@ -55,7 +59,7 @@ static known_blocks make_blocks(const size_case *size, int count, uint64_t *stat
                       .flux = calloc(cells, sizeof(float)),
                       .column = calloc(channels * (size_t)count * cells, sizeof(float)),
                       .value = calloc(channels * NEAR * cells, sizeof(float))};
-  draw_cells(&own, (int)cells, count, state);
+  draw_cells(&own, (int)cells, count, count % 2 == 0 ? (int)cells : count / 2, state);
   for (int c = 0; c < size->channels; c++) {
     fill_channel(&own, (int)cells, count, c, state, entries + (size_t)c * cells * cells);
   }

@@ -79,7 +79,7 @@ static clt_status take_known(libcamera_camera *self, int64_t deadline_ns, clt_li
   do {
     status = clt_libcamera_take(self->stream, deadline_ns, picture, error);
   } while (status == CLT_OK && !settle_exposure(self, picture));
-  if (status == CLT_OK && !picture->stamp_starts) {
+  if (status == CLT_OK) {
     picture->stamp_ns -= (int64_t)ceil(picture->exposure_s * 1e9);
   }
   return status;
@@ -155,7 +155,8 @@ static clt_status make_room(libcamera_camera *self, clt_error *error) {
                                  .responsivity = 1,
                                  .full_well = FULL_WELL,
                                  .read_noise = READ_NOISE_CODES * FULL_WELL / ((1 << self->format->bits) - 1),
-                                 .own_pixels = true};
+                                 .own_pixels = true,
+                                 .step = clt_pixels_step(self->format, &self->layout)};
   size_t samples = (size_t)self->info.width * (size_t)self->info.height * (size_t)self->info.channels;
   self->samples = clt_alloc(samples, sizeof *self->samples);
   return self->samples != NULL ? CLT_OK

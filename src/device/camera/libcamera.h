@@ -1,4 +1,4 @@
-/* Cameras of libcamera (0.0.3 of Debian 12, and 0.2 and later). There only where the feature libcamera is built
+/* Cameras of libcamera (0.0.3 of Debian 12, to 0.7; docs/libcamera.md). There only where the feature libcamera is built
  * (CLT_HAVE_LIBCAMERA). */
 #ifndef CLT_DEVICE_CAMERA_LIBCAMERA_H
 #define CLT_DEVICE_CAMERA_LIBCAMERA_H
@@ -10,11 +10,10 @@
  * them, where it tells, else a few pictures later. CLT_GONE where it is not there, CLT_BAD_INPUT where it cannot do
  * what is asked for, CLT_TIMEOUT where no picture came.
  *
- * A frame's exposed_ns is the request's SensorTimestamp (libcamera: when the first row of the active array is exposed),
- * less the exposure where the metadata tells none (USB cameras: stamped when the first bytes came); else the time at
- * which the buffer was full less the exposure. Frames carry the exposure that the request's metadata tells; where it
- * tells none, frames that may still have the exposure before are dropped. A camera
- * without a control of the exposure (vimc) has only one, for which its frame time stands. */
+ * A frame's exposed_ns is the request's SensorTimestamp less the exposure: handlers stamp the start of the readout,
+ * which ends the first row's exposure. Where there is none it is the buffer's own time less the exposure. Frames carry
+ * the exposure that the request's metadata tells; where it tells none, frames that may still have the exposure before
+ * are dropped. A camera without a control of the exposure (vimc) has only one, for which its frame time stands. */
 clt_status clt_libcamera_camera_open(const clt_camera_config *config, clt_camera **out, clt_error *error);
 
 #endif

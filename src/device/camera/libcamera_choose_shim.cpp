@@ -20,11 +20,12 @@ struct Choice {
 };
 
 /* The best format of the stream's that is read and asked for. */
-void consider(std::unique_ptr<CameraConfiguration> configuration, const std::string &wanted, Choice *best,
+void consider(std::unique_ptr<CameraConfiguration> configuration, bool raw, const std::string &wanted, Choice *best,
               std::string *offers) {
   PixelFormat format;
   clt_libcamera_format read = best->read;
-  for (const PixelFormat &offer : configuration->at(0).formats().pixelformats()) {
+  for (const PixelFormat &listed : configuration->at(0).formats().pixelformats()) {
+    PixelFormat offer = raw ? clt::unpacked(*configuration, listed) : listed;
     clt_libcamera_format one = clt_libcamera_format_find(offer.fourcc(), offer.modifier());
     if (one.code == 0) {
       continue;
@@ -49,7 +50,7 @@ Choice choose_format(Camera &camera, const std::string &wanted) {
   for (libcamera::StreamRole role : clt::roles) {
     std::unique_ptr<CameraConfiguration> configuration = camera.generateConfiguration({role});
     if (configuration != nullptr && !configuration->empty()) {
-      consider(std::move(configuration), wanted, &best, &offers);
+      consider(std::move(configuration), role == libcamera::StreamRole::Raw, wanted, &best, &offers);
     }
   }
   if (best.configuration == nullptr) {
@@ -78,6 +79,15 @@ void agree_colours(const StreamConfiguration &stream, clt_libcamera_stream *agre
 } // namespace
 
 namespace clt {
+
+PixelFormat unpacked(CameraConfiguration &configuration, const PixelFormat &offer) {
+  StreamConfiguration &stream = configuration.at(0);
+  const libcamera::Size size = stream.size;
+  stream.pixelFormat = PixelFormat(offer.fourcc());
+  bool taken = configuration.validate() != CameraConfiguration::Invalid;
+  stream.size = size;
+  return taken ? stream.pixelFormat : PixelFormat();
+}
 
 std::unique_ptr<CameraConfiguration> choose(Camera &camera, const clt_camera_config &config, unsigned buffers,
                                             clt_libcamera_stream *agreed) {

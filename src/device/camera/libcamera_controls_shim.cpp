@@ -53,22 +53,33 @@ void set_given(const Camera &camera, const libcamera::Control<T> &control, const
   list->set(control, static_cast<T>(value));
 }
 
-template <typename T, typename V>
-void set_offered(const Camera &camera, const libcamera::Control<T> &control, V value, ControlList *list) {
-  if (offered(camera, control) != nullptr) {
-    list->set(control, static_cast<T>(value));
-  }
+/* A control by which the camera changes its picture by itself, and the value that ends that. */
+struct Automatic {
+  const libcamera::ControlId &control;
+  ControlValue off;
+};
+
+/* From 0.5 on the two modes decide, and AeEnable only stands for both. */
+const std::vector<Automatic> &automatics() {
+  static const std::vector<Automatic> all = {
+#if CLT_LIBCAMERA_AT_LEAST(0, 5)
+    {controls::ExposureTimeMode, int32_t{controls::ExposureTimeModeManual}},
+    {controls::AnalogueGainMode, int32_t{controls::AnalogueGainModeManual}},
+#endif
+    {controls::AeEnable, false},
+    {controls::AwbEnable, false},
+    {controls::AfMode, int32_t{controls::AfModeManual}},
+  };
+  return all;
 }
 
 ControlList automatic_off(const Camera &camera) {
   ControlList list(camera.controls());
-#if CLT_LIBCAMERA_AT_LEAST(0, 5)
-  set_offered(camera, controls::ExposureTimeMode, controls::ExposureTimeModeManual, &list);
-  set_offered(camera, controls::AnalogueGainMode, controls::AnalogueGainModeManual, &list);
-#endif
-  set_offered(camera, controls::AeEnable, false, &list);
-  set_offered(camera, controls::AwbEnable, false, &list);
-  set_offered(camera, controls::AfMode, controls::AfModeManual, &list);
+  for (const Automatic &automatic : automatics()) {
+    if (offered(camera, automatic.control) != nullptr) {
+      list.set(automatic.control.id(), automatic.off);
+    }
+  }
   return list;
 }
 
@@ -91,12 +102,8 @@ void set_rate(const Camera &camera, double rate_hz, ControlList *list) {
 namespace clt {
 
 bool is_automatic(unsigned id) {
-#if CLT_LIBCAMERA_AT_LEAST(0, 5)
-  if (id == controls::ExposureTimeMode.id() || id == controls::AnalogueGainMode.id()) {
-    return true;
-  }
-#endif
-  return id == controls::AeEnable.id() || id == controls::AwbEnable.id() || id == controls::AfMode.id();
+  const std::vector<Automatic> &all = automatics();
+  return std::any_of(all.begin(), all.end(), [id](const Automatic &automatic) { return automatic.control.id() == id; });
 }
 
 double number_of(const ControlValue &value) {
@@ -156,13 +163,11 @@ Stages make_stages(const Camera &camera, const clt_camera_config &config, const 
   return {automatic_off(camera), values};
 }
 
-/* Where no exposure is told, as on USB, the "sensor's" time is what the kernel stamped when the first bytes came, which
- * are sent when the first rows were exposed. */
 void read_metadata(libcamera::Request &request, clt_libcamera_picture *picture) {
   const ControlList &told = request.metadata();
   auto exposure_us = told.get(controls::ExposureTime);
   auto gain = told.get(controls::AnalogueGain);
-  auto start_ns = told.get(controls::SensorTimestamp);
+  auto read_ns = told.get(controls::SensorTimestamp);
   auto black = told.get(controls::SensorBlackLevels);
   picture->exposure_s = exposure_us ? 1e-6 * *exposure_us : -1;
   picture->gain = gain ? *gain : -1;
@@ -170,9 +175,8 @@ void read_metadata(libcamera::Request &request, clt_libcamera_picture *picture) 
   if (black) {
     picture->black_level = ((*black)[0] + (*black)[1] + (*black)[2] + (*black)[3]) / (4 * BLACK_SCALE);
   }
-  picture->stamp_starts = start_ns.has_value() && exposure_us.has_value();
-  if (start_ns) {
-    picture->stamp_ns = *start_ns;
+  if (read_ns) {
+    picture->stamp_ns = *read_ns;
   }
 }
 

@@ -25,13 +25,14 @@ template <size_t size> void write(char (&to)[size], const std::string &text) {
   snprintf(to, size, "%s", text.c_str());
 }
 
-clt_libcamera_offer offer_of(const libcamera::StreamFormats &formats, const libcamera::PixelFormat &format, bool raw) {
+clt_libcamera_offer offer_of(const libcamera::StreamFormats &formats, const libcamera::PixelFormat &listed,
+                             const libcamera::PixelFormat &format, bool raw) {
   clt_libcamera_offer offer = {};
   clt_libcamera_format read = clt_libcamera_format_find(format.fourcc(), format.modifier());
   write(offer.code, read.name);
   write(offer.name, format.toString());
   offer.raw = raw;
-  for (const libcamera::Size &size : formats.sizes(format)) {
+  for (const libcamera::Size &size : formats.sizes(listed)) {
     if (int64_t(size.width) * size.height > int64_t(offer.width) * offer.height) {
       offer.width = int(size.width);
       offer.height = int(size.height);
@@ -48,9 +49,11 @@ std::vector<clt_libcamera_offer> offers_of(Camera &camera) {
     if (configuration == nullptr || configuration->empty()) {
       continue;
     }
-    const libcamera::StreamFormats &formats = configuration->at(0).formats();
-    for (const libcamera::PixelFormat &format : formats.pixelformats()) {
-      clt_libcamera_offer one = offer_of(formats, format, role == libcamera::StreamRole::Raw);
+    bool raw = role == libcamera::StreamRole::Raw;
+    const libcamera::StreamFormats formats = configuration->at(0).formats();
+    for (const libcamera::PixelFormat &listed : formats.pixelformats()) {
+      libcamera::PixelFormat given = raw ? clt::unpacked(*configuration, listed) : listed;
+      clt_libcamera_offer one = offer_of(formats, listed, given.isValid() ? given : listed, raw);
       bool known = false;
       for (const clt_libcamera_offer &offer : offers) {
         known = known || std::string(offer.name) == one.name;

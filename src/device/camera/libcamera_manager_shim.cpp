@@ -65,7 +65,7 @@ std::vector<std::shared_ptr<libcamera::Camera>> Manager::cameras() const {
 }
 
 std::string model_of(const libcamera::Camera &camera) {
-  return camera.properties().get(libcamera::properties::Model).value_or("");
+  return std::string(camera.properties().get(libcamera::properties::Model).value_or(""));
 }
 
 } // namespace clt

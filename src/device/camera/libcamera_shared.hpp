@@ -55,6 +55,10 @@ public:
 /* The streams that are tried, in this order. */
 extern const libcamera::StreamRole roles[4];
 
+/* What becomes of a raw format when it is asked for: handlers may list a mosaic only packed but give it unpacked as
+ * well, and its order is turned with the picture. Not valid where nothing comes of it. Changes the stream. */
+libcamera::PixelFormat unpacked(libcamera::CameraConfiguration &configuration, const libcamera::PixelFormat &offer);
+
 /* The configuration of one stream as config says, of so many buffers, validated; fills what is agreed on the picture.
  */
 std::unique_ptr<libcamera::CameraConfiguration> choose(libcamera::Camera &camera, const clt_camera_config &config,

@@ -276,7 +276,7 @@ void clt_libcamera::set_exposure(double seconds, uint32_t *revision) {
 
 /* One run of bytes: as it lies, or gathered where the planes do not follow each other. */
 void clt_libcamera::view(Slot *slot, clt_libcamera_picture *picture) {
-  const std::vector<FrameBuffer::Plane> &planes = slot->buffer->planes();
+  const auto &planes = slot->buffer->planes();
   const auto told = slot->buffer->metadata().planes();
   bool apart = false;
   size_t used = 0;

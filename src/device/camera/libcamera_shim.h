@@ -32,10 +32,9 @@ typedef struct clt_libcamera_stream {
 typedef struct clt_libcamera_picture {
   const uint8_t *bytes;
   size_t used;
-  int64_t stamp_ns;
-  bool stamp_starts; /* stamp_ns is the start of exposure of the first row, not the time at which the buffer was full */
-  double exposure_s; /* as the camera tells for this picture; < 0: it does not */
-  double gain;       /* likewise */
+  int64_t stamp_ns;   /* when the first row was read out, which ended its exposure */
+  double exposure_s;  /* as the camera tells for this picture; < 0: it does not */
+  double gain;        /* likewise */
   double black_level; /* fraction of full scale; < 0: not told */
   uint32_t sequence;
   uint32_t revision; /* the settings that this picture was asked for with (clt_libcamera_set_exposure) */

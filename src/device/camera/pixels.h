@@ -72,6 +72,10 @@ clt_status clt_decode_mosaic(const clt_pixel_format *format, const clt_picture_l
 clt_status clt_decode_jpeg(const clt_pixel_format *format, const clt_picture_layout *layout, const uint8_t *bytes,
                            size_t used, uint16_t *samples, clt_error *error);
 
+/* Twice the most that the camera's own rounding moves a sample, in code values; what a compressed picture loses beside
+ * is not in it. */
+double clt_pixels_step(const clt_pixel_format *format, const clt_picture_layout *layout);
+
 /* What the decoders share: refuses a picture of less than needed bytes. */
 clt_status clt_pixels_whole(const clt_pixel_format *format, size_t used, size_t needed, clt_error *error);
 

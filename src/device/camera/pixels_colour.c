@@ -28,6 +28,18 @@ clt_ycbcr clt_ycbcr_make(const clt_picture_layout *layout) {
                      .blue_cb = (float)blue};
 }
 
+double clt_pixels_step(const clt_pixel_format *format, const clt_picture_layout *layout) {
+  static const clt_picture_layout jpeg = {.matrix = CLT_MATRIX_601};
+  double full = (1 << format->bits) - 1;
+  if (!format->differences && !format->compressed) {
+    double stretched = layout->limited && format->channels == 3 ? 255.0 / 219 : 1;
+    return stretched * full / ((1 << format->depth) - 1);
+  }
+  clt_ycbcr form = clt_ycbcr_make(format->compressed ? &jpeg : layout);
+  float colour = fmaxf(fmaxf(form.red_cr, form.blue_cb), -form.green_cb - form.green_cr);
+  return (double)(form.y_gain + colour) * full / FULL_10 * ldexp(1, 8 - format->depth);
+}
+
 static uint16_t clip(float value) {
   return value <= 0 ? 0 : value >= (float)FULL_10 ? (uint16_t)FULL_10 : (uint16_t)(value + 0.5f);
 }

@@ -49,7 +49,8 @@ static void describe(const clt_camera *camera, clt_camera_info *info) {
                             .responsivity = 1,
                             .full_well = FULL_WELL,
                             .read_noise = READ_NOISE_CODES * FULL_WELL / ((1 << mode->format->bits) - 1),
-                            .own_pixels = true};
+                            .own_pixels = true,
+                            .step = clt_pixels_step(mode->format, &mode->layout)};
 }
 
 static double exposure(const v4l2_camera *self) {

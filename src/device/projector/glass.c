@@ -3,10 +3,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "device/live_kernels.h"
 #include "device/projector/shaders.h"
 
 enum { N = CLT_PANEL_CHANNELS, TEXEL_CHANNELS = 4 };
-enum { CODES, LIVE };
+enum { CODES, LIVE, STRETCHED, PROGRAMS };
 
 int clt_glass_bits(void) {
   static const GLenum sizes[N] = {GL_FRAMEBUFFER_ATTACHMENT_RED_SIZE, GL_FRAMEBUFFER_ATTACHMENT_GREEN_SIZE,
@@ -79,7 +80,8 @@ static void init_uploads(clt_glass *glass) {
                               .bytes = bytes ? 1 : 2};
   glass->content = (clt_upload){
       .target = GL_TEXTURE_2D, .internal = GL_RGB8UI, .format = GL_RGB_INTEGER, .type = GL_UNSIGNED_BYTE, .bytes = N};
-  glass->gain = glass->offset = glass->encode = table_of(GL_RGBA32F, GL_RGBA, texel);
+  glass->gain = glass->offset = table_of(GL_RGBA32F, GL_RGBA, texel);
+  glass->encode = table_of(GL_RG32F, GL_RG, sizeof(clt_live_piece));
   glass->decode = table_of(GL_R32F, GL_RED, sizeof(float));
   clt_upload *const all[] = {&glass->codes,  &glass->content, &glass->gain,
                              &glass->offset, &glass->decode,  &glass->encode};
@@ -106,13 +108,9 @@ static clt_status fill_encode(clt_glass *glass, const clt_panel *panel, clt_erro
   if (glass->encode_known && memcmp(panel, &glass->panel, sizeof *panel) == 0) {
     return CLT_OK;
   }
-  float *table = clt_upload_begin(&glass->encode, CLT_SHADER_ENCODE, 1, 1);
-  for (int i = 0; i < CLT_SHADER_ENCODE && table != NULL; i++) {
-    double root = (double)i / (CLT_SHADER_ENCODE - 1);
-    for (int c = 0; c < N; c++) {
-      table[TEXEL_CHANNELS * i + c] = (float)clt_curve_encode(&panel->response[c], root * root);
-    }
-    table[TEXEL_CHANNELS * i + N] = 0;
+  clt_live_piece *table = clt_upload_begin(&glass->encode, CLT_SHADER_ENCODE, N, 1);
+  for (int c = 0; c < N && table != NULL; c++) {
+    clt_live_tabulate(&panel->response[c], CLT_SHADER_ENCODE - 1, table + c * CLT_SHADER_ENCODE);
   }
   glass->encode_known = table != NULL && clt_upload_end(&glass->encode);
   memcpy(&glass->panel, panel, sizeof *panel);
@@ -122,7 +120,7 @@ static clt_status fill_encode(clt_glass *glass, const clt_panel *panel, clt_erro
 /* What stays for good: which texture stands at which unit, sizes. */
 static void set_uniforms(const clt_glass *glass) {
   static const char *const units[] = {"codes", "content", "gain", "offset", "decode", "encode"};
-  for (int i = 0; i < 2; i++) {
+  for (int i = 0; i < PROGRAMS; i++) {
     GLuint program = glass->programs[i];
     glUseProgram(program);
     glUniform2i(glGetUniformLocation(program, "panel"), glass->width, glass->height);
@@ -134,12 +132,15 @@ static void set_uniforms(const clt_glass *glass) {
 }
 
 clt_status clt_glass_open(int width, int height, int bits, clt_glass *glass, clt_error *error) {
+  static const char *const fragments[PROGRAMS] = {clt_shader_codes, clt_shader_live, clt_shader_stretched};
   *glass = (clt_glass){.width = width, .height = height, .bits = bits};
   plain_state();
   glGenVertexArrays(1, &glass->vertices);
   init_uploads(glass);
-  clt_status status = link_program(clt_shader_codes, &glass->programs[CODES], error);
-  status = status == CLT_OK ? link_program(clt_shader_live, &glass->programs[LIVE], error) : status;
+  clt_status status = CLT_OK;
+  for (int i = 0; i < PROGRAMS && status == CLT_OK; i++) {
+    status = link_program(fragments[i], &glass->programs[i], error);
+  }
   status = status == CLT_OK ? fill_decode(glass, error) : status;
   if (status != CLT_OK) {
     clt_glass_close(glass);
@@ -158,8 +159,9 @@ void clt_glass_close(clt_glass *glass) {
   for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
     clt_upload_finish(all[i]);
   }
-  glDeleteProgram(glass->programs[CODES]);
-  glDeleteProgram(glass->programs[LIVE]);
+  for (int i = 0; i < PROGRAMS; i++) {
+    glDeleteProgram(glass->programs[i]);
+  }
   glDeleteVertexArrays(1, &glass->vertices);
   *glass = (clt_glass){0};
 }
@@ -175,7 +177,7 @@ clt_status clt_glass_put(clt_glass *glass, const float *codes, clt_error *error)
   } else {
     clt_codes_to_words(codes, count, (1 << glass->bits) - 1, to);
   }
-  glass->live = false;
+  glass->program = CODES;
   return clt_upload_end(&glass->codes) ? CLT_OK : lost(error);
 }
 
@@ -221,23 +223,23 @@ clt_status clt_glass_put_live(clt_glass *glass, const clt_live_picture *picture,
   bool whole = clt_upload_end(&glass->content);
   whole = put_field(&glass->gain, picture->gain, picture->grid_width, picture->grid_height) && whole;
   whole = put_field(&glass->offset, picture->offset, picture->grid_width, picture->grid_height) && whole;
-  set_unmix(glass->programs[LIVE], &picture->panel);
+  glass->program = picture->width == glass->width && picture->height == glass->height ? LIVE : STRETCHED;
+  set_unmix(glass->programs[glass->program], &picture->panel);
   glass->seed = picture->seed;
-  glass->live = true;
   return whole ? CLT_OK : lost(error);
 }
 
 void clt_glass_draw(clt_glass *glass, int width, int height) {
   const clt_upload *const units[] = {&glass->codes,  &glass->content, &glass->gain,
                                      &glass->offset, &glass->decode,  &glass->encode};
-  GLuint program = glass->programs[glass->live ? LIVE : CODES];
+  GLuint program = glass->programs[glass->program];
   for (size_t unit = 0; unit < sizeof units / sizeof units[0]; unit++) {
     glActiveTexture(GL_TEXTURE0 + (GLenum)unit);
     glBindTexture(units[unit]->target, units[unit]->texture);
   }
   glUseProgram(program);
   glUniform2i(glGetUniformLocation(program, "glass"), width, height);
-  if (glass->live) {
+  if (glass->program != CODES) {
     glUniform1ui(glGetUniformLocation(program, "seed"), glass->seed);
   }
   glBindVertexArray(glass->vertices);

@@ -9,14 +9,15 @@
 typedef struct clt_glass {
   int width, height, bits; /* of the panel */
   GLuint vertices;         /* an empty vertex array, which core profiles insist on */
-  GLuint programs[2];      /* for codes, for moving pictures */
-  bool live;               /* what was put last */
+  GLuint programs[3];      /* for codes, for moving pictures of the panel's size, and of another */
+  int program;             /* for what was put last */
   uint32_t seed;
   clt_upload codes;        /* three layers of unsigned codes */
   clt_upload content;      /* sRGB codes */
   clt_upload gain, offset; /* on the grid, channels in R, G, B */
   clt_upload decode;       /* linear light of the 256 sRGB codes */
-  clt_upload encode;       /* codes 0..1 of the panel at light (i / (entries - 1))^2, channels in R, G, B */
+  clt_upload encode;       /* codes 0..1 of the panel at light (i / (entries - 1))^2 in R, the step to the next in G;
+                            * a row for each channel */
   clt_panel panel;         /* that encode is for */
   bool encode_known;
 } clt_glass;

@@ -57,17 +57,20 @@ static bool take_panel(const char *line, clt_projector_info *panel) {
          panel->bits <= 16 && panel->refresh_s > 0;
 }
 
+/* Recordings from before there was a step have none. */
 static bool take_camera(const char *line, clt_camera_info *c) {
-  int end = 0, own = 0;
+  int end = 0, own = 0, step = 0;
   int count = sscanf(line, "camera %d %d %d %d %lf %lf %lf %lf %lf %lf %lf %d%n", &c->width, &c->height, &c->channels,
                      &c->bits, &c->frame_s, &c->exposure_min_s, &c->exposure_max_s, &c->black_level, &c->responsivity,
                      &c->full_well, &c->read_noise, &own, &end);
   c->own_pixels = own == 1;
-  return count == 12 && (own == 0 || own == 1) && line[end] == '\0' && c->width >= 1 && c->width <= SIDE_MAX &&
-         c->height >= 1 && c->height <= SIDE_MAX && (c->channels == 1 || c->channels == 3) && c->bits >= 1 &&
-         c->bits <= 16 && c->frame_s > 0 && c->exposure_min_s > 0 && c->exposure_max_s >= c->exposure_min_s &&
-         c->black_level >= 0 && c->black_level < (1 << c->bits) - 1 && c->responsivity > 0 && c->full_well > 0 &&
-         c->read_noise >= 0;
+  c->step = 0;
+  end += count == 12 && sscanf(line + end, " %lf%n", &c->step, &step) == 1 ? step : 0;
+  return count == 12 && c->step >= 0 && (own == 0 || own == 1) && line[end] == '\0' && c->width >= 1 &&
+         c->width <= SIDE_MAX && c->height >= 1 && c->height <= SIDE_MAX && (c->channels == 1 || c->channels == 3) &&
+         c->bits >= 1 && c->bits <= 16 && c->frame_s > 0 && c->exposure_min_s > 0 &&
+         c->exposure_max_s >= c->exposure_min_s && c->black_level >= 0 && c->black_level < (1 << c->bits) - 1 &&
+         c->responsivity > 0 && c->full_well > 0 && c->read_noise >= 0;
 }
 
 static bool take_record(const char *line, clt_record *record) {
@@ -182,11 +185,11 @@ clt_status clt_index_create(const char *folder, const clt_projector_info *panel,
   }
   int length = snprintf(head, sizeof head,
                         TITLE "\npanel %d %d %d %d %.17g\ncamera %d %d %d %d %.17g %.17g %.17g %.17g %.17g %.17g "
-                              "%.17g %d\n",
+                              "%.17g %d %.17g\n",
                         panel->width, panel->height, panel->channels, panel->bits, panel->refresh_s, sensor->width,
                         sensor->height, sensor->channels, sensor->bits, sensor->frame_s, sensor->exposure_min_s,
                         sensor->exposure_max_s, sensor->black_level, sensor->responsivity, sensor->full_well,
-                        sensor->read_noise, sensor->own_pixels);
+                        sensor->read_noise, sensor->own_pixels, sensor->step);
   status = append(*descriptor, head, (size_t)length, error);
   if (status != CLT_OK) {
     close(*descriptor);

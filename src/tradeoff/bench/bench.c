@@ -72,7 +72,8 @@ static clt_status run_method(method_run *own, const clt_transport *transport, cl
   const clt_transport_info info = clt_transport_describe(transport);
   double ms[2][CLT_BENCH_TURNS];
   clt_status status = CLT_OK;
-  for (int k = 0; status == CLT_OK && k < 2 * CLT_BENCH_TURNS; k++) {
+  peer->converged = true;
+  for (int k = 0; status == CLT_OK && peer->converged && k < 2 * CLT_BENCH_TURNS; k++) {
     const bool warm = k >= CLT_BENCH_TURNS;
     clt_solve_result result;
     memcpy(own->start, own->drive, (size_t)info.channels * info.cols * sizeof *own->start);
@@ -81,6 +82,7 @@ static clt_status run_method(method_run *own, const clt_transport *transport, cl
     status = clt_solver_run(own->solver, own->wanted, warm ? own->start : NULL, own->drive, &result, error);
     ms[warm][k % CLT_BENCH_TURNS] = 1e3 * result.seconds;
     peer->error = warm ? peer->error : result.residual;
+    peer->converged = result.converged;
   }
   peer->ms = clt_bench_median(ms[0], CLT_BENCH_TURNS);
   peer->warm_ms = clt_bench_median(ms[1], CLT_BENCH_TURNS);
@@ -111,15 +113,16 @@ static clt_status measure_method(const clt_transport *transport, const clt_certi
 
 static clt_status measure_peers(const clt_transport *transport, const clt_certificate *certificate,
                                 const clt_bench_options *options, clt_bench_report *report, clt_error *error) {
-  clt_status status = clt_bench_jacobi(transport, options->target_error, &report->peer[report->peer_count++], error);
+  clt_status status =
+      clt_bench_jacobi(transport, certificate, options->target_error, &report->peer[report->peer_count++], error);
   static const char *const METHODS[] = {"gmres", "bounded"};
   for (size_t k = 0; status == CLT_OK && k < 2; k++) {
     status = measure_method(transport, certificate, METHODS[k], options, &report->peer[report->peer_count++], error);
   }
   for (int k = 0; status == CLT_OK && k < report->peer_count; k++) {
     clt_bench_peer *peer = &report->peer[k];
-    peer->ratio = peer->ms / report->frame.cold_ms;
-    peer->warm_ratio = peer->warm_ms / report->frame.p50_ms;
+    peer->ratio = peer->converged ? peer->ms / report->frame.cold_ms : 0;
+    peer->warm_ratio = peer->converged ? peer->warm_ms / report->frame.p50_ms : 0;
   }
   return status;
 }

@@ -25,8 +25,8 @@ clt_status clt_bench_frames(const clt_transport *transport, const clt_certificat
                             const clt_bench_options *options, double swing, clt_bench_frame *frame, clt_error *error);
 /* The report's iteration (eq. 43) in single precision over compressed rows of as few entries (128, 256, ...) as make
  * its answer as exact as target_error by all of T, within 1.25 GiB. Fills all but the ratios. */
-clt_status clt_bench_jacobi(const clt_transport *transport, double target_error, clt_bench_peer *peer,
-                            clt_error *error);
+clt_status clt_bench_jacobi(const clt_transport *transport, const clt_certificate *certificate, double target_error,
+                            clt_bench_peer *peer, clt_error *error);
 
 /* Adds up an array, each thread its part, in as many sums as keep the processor busy: the plain read of memory that
  * products are set beside. */

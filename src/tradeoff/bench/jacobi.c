@@ -5,7 +5,6 @@
  * rows take the same cells, which favours the iteration: what it reads of l stays in the nearest cache. Entries are
  * doubled until the drive that the iteration ends at is as exact as the frame's, or memory is short. */
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -150,19 +149,19 @@ static double want(rows *own, const clt_transport *transport, int number) {
   return sqrt(sum);
 }
 
-/* One frame from `light`; returns milliseconds. */
-static double run(rows *own, double stop_at) {
+/* One frame from `light`, *ms it takes; false where it does not come to the end. */
+static bool run(rows *own, double stop_at, double *ms) {
   enum { ITERATIONS_MOST = 200 };
   const int64_t since_ns = clt_clock_ns();
-  for (int k = 0; k < ITERATIONS_MOST; k++) {
+  bool done = false;
+  for (int k = 0; k < ITERATIONS_MOST && !done; k++) {
     float *before = own->light;
     own->light = own->before;
     own->before = before;
-    if (iterate(own) <= stop_at) {
-      break;
-    }
+    done = iterate(own) <= stop_at;
   }
-  return 1e3 * clt_clock_since(since_ns);
+  *ms = 1e3 * clt_clock_since(since_ns);
+  return done;
 }
 
 /* ||T F^-1 l - b|| / ||b|| by T as stored. */
@@ -186,51 +185,72 @@ static void measure(rows *own, const clt_transport *transport, double tolerance,
   for (int k = 0; k < CLT_BENCH_TURNS; k++) {
     const double wanted = want(own, transport, 0);
     memset(own->light, 0, (size_t)own->channels * own->cells * sizeof *own->light);
-    cold[k] = run(own, tolerance * wanted);
+    run(own, tolerance * wanted, &cold[k]);
   }
   peer->error = judge(own, transport);
   for (int k = 0; k < CLT_BENCH_TURNS; k++) {
-    warm[k] = run(own, tolerance * want(own, transport, k + 1));
+    run(own, tolerance * want(own, transport, k + 1), &warm[k]);
   }
   peer->ms = clt_bench_median(cold, CLT_BENCH_TURNS);
   peer->warm_ms = clt_bench_median(warm, CLT_BENCH_TURNS);
   peer->entries = (int)own->entries;
 }
 
-/* The loosest tolerance of its own, down to a quarter of the target error, whose answer is within that by all of T. */
+/* The loosest tolerance of its own, down to a quarter of the target error, whose answer is within that by all of T; 0
+ * where it does not come to the end. */
 static double choose_tolerance(rows *own, const clt_transport *transport, double target_error, double *error) {
-  double tolerance = 2 * target_error;
+  double tolerance = 2 * target_error, ms;
   do {
     tolerance /= 2;
     const double wanted = want(own, transport, 0);
     memset(own->light, 0, (size_t)own->channels * own->cells * sizeof *own->light);
-    run(own, tolerance * wanted);
+    if (!run(own, tolerance * wanted, &ms)) {
+      return 0;
+    }
     *error = judge(own, transport);
   } while (*error > target_error && tolerance > target_error / 4);
   return tolerance;
 }
 
-clt_status clt_bench_jacobi(const clt_transport *transport, double target_error, clt_bench_peer *peer,
-                            clt_error *error) {
+static bool is_known_to_diverge(const clt_certificate *certificate, int channels) {
+  bool diverges = false;
+  for (int c = 0; c < channels; c++) {
+    diverges = diverges || clt_certificate_channel(certificate, c)->radius_low >= 1;
+  }
+  return diverges;
+}
+
+/* With rows of so many entries, as many as are worth it: *done. */
+static clt_status try_rows(rows *own, const clt_transport *transport, size_t entries, double target_error,
+                           clt_bench_peer *peer, bool *done, clt_error *error) {
+  clt_status status = reserve_rows(own, entries, error);
+  if (status != CLT_OK) {
+    return status;
+  }
+  double left = 0;
+  invert_diagonal(own, transport);
+  for (int c = 0; c < own->channels; c++) {
+    fill_rows(own, transport, c);
+  }
+  const double tolerance = choose_tolerance(own, transport, target_error, &left);
+  peer->converged = tolerance > 0;
+  *done = left <= target_error || bytes_of(own, 2 * entries) > BYTES_MOST || 2 * entries > own->cells;
+  if (*done && peer->converged) {
+    measure(own, transport, tolerance, peer);
+  }
+  *done = *done || !peer->converged;
+  return CLT_OK;
+}
+
+clt_status clt_bench_jacobi(const clt_transport *transport, const clt_certificate *certificate, double target_error,
+                            clt_bench_peer *peer, clt_error *error) {
   const clt_transport_info info = clt_transport_describe(transport);
   rows own = {.cells = info.cols, .channels = info.channels, .width = info.width, .height = info.height};
-  clt_status status = reserve_vectors(&own, error);
-  bool done = false;
+  *peer = (clt_bench_peer){.name = "report-jacobi-csr-f32"};
+  bool done = is_known_to_diverge(certificate, info.channels);
+  clt_status status = done ? CLT_OK : reserve_vectors(&own, error);
   for (size_t entries = ENTRIES_LEAST; status == CLT_OK && !done; entries *= 2) {
-    status = reserve_rows(&own, entries, error);
-    if (status == CLT_OK) {
-      double left;
-      invert_diagonal(&own, transport);
-      for (int c = 0; c < own.channels; c++) {
-        fill_rows(&own, transport, c);
-      }
-      const double tolerance = choose_tolerance(&own, transport, target_error, &left);
-      done = left <= target_error || bytes_of(&own, 2 * entries) > BYTES_MOST || 2 * entries > own.cells;
-      if (done) {
-        snprintf(peer->name, sizeof peer->name, "report-jacobi-csr-f32");
-        measure(&own, transport, tolerance, peer);
-      }
-    }
+    status = try_rows(&own, transport, entries, target_error, peer, &done, error);
   }
   release(&own);
   return status;

@@ -1,0 +1,144 @@
+#include "device/live_kernels.h"
+
+#include <math.h>
+#include <string.h>
+
+#define INLINE static inline __attribute__((always_inline)) /* into each variant */
+
+void clt_live_tabulate(const clt_curve *response, int pieces, clt_live_piece *piece) {
+  double next = clt_curve_encode(response, 0);
+  for (int k = 0; k <= pieces; k++) {
+    const double root = fmin((k + 1.0) / pieces, 1), code = next;
+    next = clt_curve_encode(response, root * root);
+    piece[k] = (clt_live_piece){(float)code, (float)(next - code)};
+  }
+}
+
+typedef float four __attribute__((vector_size(4 * sizeof(float))));
+typedef uint64_t two __attribute__((vector_size(2 * sizeof(uint64_t))));
+
+INLINE uint64_t whole(const clt_live_piece *piece) {
+  uint64_t bits;
+  memcpy(&bits, piece, sizeof bits);
+  return bits;
+}
+
+INLINE void split(const uint8_t *codes, size_t count, uint8_t *plane) {
+  uint8_t *red = plane, *green = plane + count, *blue = plane + 2 * count;
+  for (size_t x = 0; x < count; x++) {
+    red[x] = codes[CLT_LIVE_COLOURS * x];
+    green[x] = codes[CLT_LIVE_COLOURS * x + 1];
+    blue[x] = codes[CLT_LIVE_COLOURS * x + 2];
+  }
+}
+
+/* Pieces are loaded one by one and sorted in registers: gathers are not faster, and missing from many processors. */
+INLINE void interpolate(const clt_live_piece *piece, const int32_t *at, const float *part, size_t count, float *out) {
+  size_t x = 0;
+  for (; x + 4 <= count; x += 4) {
+    const four front = (four)(two){whole(piece + at[x]), whole(piece + at[x + 1])};
+    const four back = (four)(two){whole(piece + at[x + 2]), whole(piece + at[x + 3])};
+    const four value = __builtin_shufflevector(front, back, 0, 2, 4, 6);
+    const four step = __builtin_shufflevector(front, back, 1, 3, 5, 7);
+    four way;
+    memcpy(&way, part + x, sizeof way);
+    const four sum = value + way * step;
+    memcpy(out + x, &sum, sizeof sum);
+  }
+  for (; x < count; x++) {
+    out[x] = piece[at[x]].value + part[x] * piece[at[x]].step;
+  }
+}
+
+INLINE float clip(float value) {
+  value = value > 0 ? value : 0; /* NaN too */
+  return value < 1 ? value : 1;
+}
+
+INLINE void drive(const clt_live_field *gain, const clt_live_field *offset, float down, const float *restrict light,
+                  size_t count, float *restrict out) {
+  const float *restrict gain_above = gain->upper, *restrict gain_below = gain->lower;
+  const float *restrict offset_above = offset->upper, *restrict offset_below = offset->lower;
+  for (size_t x = 0; x < count; x++) {
+    const float by = gain_above[x] + down * (gain_below[x] - gain_above[x]);
+    const float more = offset_above[x] + down * (offset_below[x] - offset_above[x]);
+    out[x] = clip(by * light[x] + more);
+  }
+}
+
+INLINE void place(const float *restrict light, float pieces, size_t count, int32_t *restrict at, float *restrict part) {
+  for (size_t x = 0; x < count; x++) {
+    const float root = pieces * sqrtf(light[x]);
+    at[x] = (int32_t)root;
+    part[x] = root - (float)at[x];
+  }
+}
+
+/* A number in 0..1 for each counter: 32 bits, of which vectors are multiplied at once. The multipliers are those
+ * that Wellons found to bias least. */
+INLINE float scatter(uint32_t key) {
+  key = (key ^ (key >> 16)) * 0x7feb352du;
+  key = (key ^ (key >> 15)) * 0x846ca68bu;
+  return (float)(int32_t)((key ^ (key >> 16)) >> 8) * 0x1p-24F;
+}
+
+INLINE void dither(float *codes, size_t count, float full, uint32_t start) {
+  for (size_t k = 0; k < count; k++) {
+    const float step = (float)(int32_t)(codes[k] * full + scatter(start + (uint32_t)k));
+    codes[k] = (step < full ? step : full) / full;
+  }
+}
+
+#define VARIANT(name, attributes)                                                                                      \
+  attributes static void split_##name(const uint8_t *codes, size_t count, uint8_t *plane) {                            \
+    split(codes, count, plane);                                                                                        \
+  }                                                                                                                    \
+  attributes static void interpolate_##name(const clt_live_piece *piece, const int32_t *at, const float *part,         \
+                                            size_t count, float *out) {                                                \
+    interpolate(piece, at, part, count, out);                                                                          \
+  }                                                                                                                    \
+  attributes static void drive_##name(const clt_live_field *gain, const clt_live_field *offset, float down,            \
+                                      const float *light, size_t count, float *out) {                                  \
+    drive(gain, offset, down, light, count, out);                                                                      \
+  }                                                                                                                    \
+  attributes static void place_##name(const float *light, float pieces, size_t count, int32_t *at, float *part) {      \
+    place(light, pieces, count, at, part);                                                                             \
+  }                                                                                                                    \
+  attributes static void dither_##name(float *codes, size_t count, float full, uint32_t start) {                       \
+    dither(codes, count, full, start);                                                                                 \
+  }                                                                                                                    \
+  static const clt_live_row_kernels name = {.needs = NEEDS_##name,                                                     \
+                                            .runs_here = has_##name,                                                   \
+                                            .split = split_##name,                                                     \
+                                            .interpolate = interpolate_##name,                                         \
+                                            .drive = drive_##name,                                                     \
+                                            .place = place_##name,                                                     \
+                                            .dither = dither_##name};
+
+static bool has_portable(void) {
+  return true;
+}
+
+#define NEEDS_portable NULL
+VARIANT(portable, )
+
+#if defined(__x86_64__)
+static bool has_avx2(void) {
+  return __builtin_cpu_supports("avx2");
+}
+
+#define NEEDS_avx2 "AVX2"
+VARIANT(avx2, __attribute__((target("avx2"))))
+
+const clt_live_row_kernels *const clt_live_row_variants[] = {&avx2, &portable, NULL};
+#else
+const clt_live_row_kernels *const clt_live_row_variants[] = {&portable, NULL};
+#endif
+
+const clt_live_row_kernels *clt_live_row_choose(void) {
+  size_t k = 0;
+  while (!clt_live_row_variants[k]->runs_here()) {
+    k++;
+  }
+  return clt_live_row_variants[k];
+}

@@ -1,0 +1,120 @@
+/* Every variant of the loops that encode a row of a moving picture, against the formula in double. */
+#include "device/live_kernels.h"
+#include "support.h"
+
+enum { MOST = 131, COLOURS = CLT_LIVE_COLOURS };
+
+static void fill(float *values, size_t count, double low, double high, uint64_t *random) {
+  for (size_t k = 0; k < count; k++) {
+    values[k] = (float)(low + (high - low) * test_random(random));
+  }
+}
+
+static void check_split(const clt_live_row_kernels *variant, size_t count, uint64_t *random) {
+  uint8_t codes[COLOURS * MOST], plane[COLOURS * MOST];
+  for (size_t k = 0; k < COLOURS * count; k++) {
+    codes[k] = (uint8_t)(256 * test_random(random));
+  }
+  variant->split(codes, count, plane);
+  for (size_t k = 0; k < COLOURS * count; k++) {
+    assert_int_equal(plane[k % COLOURS * count + k / COLOURS], codes[k]);
+  }
+}
+
+static void check_interpolate(const clt_live_row_kernels *variant, size_t count, uint64_t *random) {
+  enum { PIECES = 17 };
+  clt_live_piece piece[PIECES];
+  int32_t at[MOST];
+  float part[MOST], out[MOST + 1];
+  fill(&piece[0].value, 2 * PIECES, -1, 1, random);
+  fill(part, count, 0, 1, random);
+  for (size_t x = 0; x < count; x++) {
+    at[x] = (int32_t)(PIECES * test_random(random));
+  }
+  out[count] = 9;
+  variant->interpolate(piece, at, part, count, out);
+  for (size_t x = 0; x < count; x++) {
+    const clt_live_piece own = piece[at[x]];
+    assert_near(out[x], (double)own.value + (double)part[x] * (double)own.step, 2e-7);
+  }
+  assert_near(out[count], 9, 0);
+}
+
+static void check_drive(const clt_live_row_kernels *variant, size_t count, uint64_t *random) {
+  float gains[2][MOST], offsets[2][MOST], light[MOST], drive[MOST];
+  const float down = (float)test_random(random);
+  fill(light, count, 0, 1, random);
+  for (int k = 0; k < 2; k++) {
+    fill(gains[k], count, 0, 1.5, random);
+    fill(offsets[k], count, -0.6, 0.6, random);
+  }
+  gains[0][0] = NAN;
+  const clt_live_field gain = {gains[0], gains[1]}, offset = {offsets[0], offsets[1]};
+  variant->drive(&gain, &offset, down, light, count, drive);
+  assert_near(drive[0], 0, 0);
+  for (size_t x = 1; x < count; x++) {
+    const double lower = (double)down, upper = 1 - lower;
+    const double by = upper * (double)gains[0][x] + lower * (double)gains[1][x];
+    const double more = upper * (double)offsets[0][x] + lower * (double)offsets[1][x];
+    assert_near(drive[x], fmin(fmax(by * (double)light[x] + more, 0), 1), 5e-7);
+  }
+}
+
+/* The ends lie in the first and behind the last of the pieces. */
+static void check_place(const clt_live_row_kernels *variant, size_t count, uint64_t *random) {
+  const float pieces = 1024;
+  float light[MOST], part[MOST];
+  int32_t at[MOST];
+  fill(light, count, 0, 1, random);
+  light[0] = 1;
+  light[count - 1] = count > 1 ? 0 : light[count - 1];
+  variant->place(light, pieces, count, at, part);
+  for (size_t x = 0; x < count; x++) {
+    assert_true(at[x] >= 0 && at[x] <= (int32_t)pieces && part[x] >= 0 && part[x] < 1);
+    assert_near(at[x] + (double)part[x], (double)pieces * sqrt((double)light[x]), 2e-4);
+  }
+  assert_int_equal(at[0], (int32_t)pieces);
+  assert_near(part[0], 0, 0);
+}
+
+/* One of the two steps beside a code, the same by every variant and wherever a run begins. */
+static void check_dither(const clt_live_row_kernels *variant, size_t count, uint64_t *random) {
+  const float full = 255;
+  const uint32_t start = (uint32_t)(4e9 * test_random(random));
+  const size_t from = count / 3;
+  float codes[MOST], own[MOST], first[MOST];
+  size_t last = 0;
+  while (clt_live_row_variants[last + 1] != NULL) {
+    last++;
+  }
+  fill(codes, count, 0, 1, random);
+  memcpy(own, codes, sizeof own);
+  memcpy(first, codes, sizeof first);
+  variant->dither(own, from, full, start);
+  variant->dither(own + from, count - from, full, start + (uint32_t)from);
+  clt_live_row_variants[last]->dither(first, count, full, start);
+  for (size_t k = 0; k < count; k++) {
+    assert_near(own[k], first[k], 0);
+    assert_near((double)(own[k] * full), rint((double)(own[k] * full)), 1e-4);
+    assert_true(fabs((double)(own[k] - codes[k])) * (double)full < 1.0001);
+  }
+}
+
+static void variants_are_those_of_the_formula(void **state) {
+  (void)state;
+  for (size_t v = 0; clt_live_row_variants[v] != NULL; v++) {
+    uint64_t random = 5;
+    for (size_t count = 1; clt_live_row_variants[v]->runs_here() && count <= MOST; count++) {
+      check_split(clt_live_row_variants[v], count, &random);
+      check_interpolate(clt_live_row_variants[v], count, &random);
+      check_drive(clt_live_row_variants[v], count, &random);
+      check_place(clt_live_row_variants[v], count, &random);
+      check_dither(clt_live_row_variants[v], count, &random);
+    }
+  }
+}
+
+int main(void) {
+  const struct CMUnitTest tests[] = {cmocka_unit_test(variants_are_those_of_the_formula)};
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
