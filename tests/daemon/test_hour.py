@@ -23,6 +23,7 @@ LINES = [re.compile(text) for text in (
     r"beside \d+ frames of the camera others were refused: .*",
     r"(holding|opening|calibrating|acquiring|verifying): (.*: )?the simulated camera (is|was) unplugged",
     r"holding the last picture; next try in [\d.]+ s",
+    r"the acquisition begins anew, what was measured before it was interrupted does not count: .*",
 )]
 
 
@@ -93,11 +94,12 @@ def check_log(run, faults, status):
     expected = faults["stuck"] * seen
     spread = 5 * math.sqrt(expected)
     assert expected - spread <= frames["repeated"] <= 2.5 * expected + spread, (frames, faults)
-    assert frames["torn"] > 0 and frames["strange"] == 0, frames
+    assert frames["strange"] == 0, frames
     return len(lost), frames
 
 
 def an_hour_leaves_nothing_behind_and_nothing_untold():
+    torn = 0  # most halves of two frames look alike: with so few frames only some seeds have one that is found
     for seed in (1,) if SANITIZED else (1, 2):
         with exhibit(12, 9) as run:
             faults = draw_faults(random.Random(seed))
@@ -124,9 +126,11 @@ def an_hour_leaves_nothing_behind_and_nothing_untold():
                 client.ask("hold")  # so that what was told is what is counted
                 status = client.ask("status")
             lost, frames = check_log(run, faults, status)
+            torn += frames["torn"]
             print(f"seed {seed}: resident {resident} KiB, unplugged {lost} times, frames {frames}")
             assert SANITIZED or abs(resident[-1] / resident[0] - 1) <= 0.01, resident
             assert run.stop()[0] == 0
+    assert torn > 0
 
 
 if __name__ == "__main__":
