@@ -37,9 +37,9 @@ typedef struct store_record {
 clt_status store_open(const char *folder, store *out, clt_error *error);
 void store_close(store *state); /* accepts a zeroed one */
 /* The path of a file in the folder; out has room for CLT_PATH_MAX. */
-/* Of the journal of the acquisition under way in a state directory; empty where the path is too long. */
-void store_journal_path(const char *folder, char path[CLT_PATH_MAX]);
 clt_status store_path(const store *state, const char *name, char *out, clt_error *error);
+/* That of the journal of the acquisition under way; empty where the path is too long. */
+void store_journal_path(const char *folder, char path[CLT_PATH_MAX]);
 
 /* Empty where there is none or it cannot be read. */
 void store_read_record(const store *state, store_record *record);

@@ -75,7 +75,9 @@ static clt_status prepare(clt_mapping *self, clt_error *error) {
   }
   status = status == CLT_OK ? solve_unbounded(self, wanted, self->b, error) : status;
   free(wanted);
-  find_factors(self);
+  if (status == CLT_OK) {
+    find_factors(self);
+  }
   return status;
 }
 

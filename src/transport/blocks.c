@@ -104,6 +104,18 @@ static void sum_blocks(const clt_block_storage *own, const slice *of, const doub
   }
 }
 
+/* room->even = the means over the blocks, by every thread of a team. */
+static void find_even(const clt_transport *transport, const workspace *room, const double *values, bool weighted) {
+  const clt_block_storage *own = transport->storage;
+#pragma omp for schedule(dynamic, 1)
+  for (size_t k = 0; k < SLICES; k++) {
+    const slice of = slice_of(transport, room, k);
+    sum_blocks(own, &of, values, weighted, of.of_blocks);
+  }
+#pragma omp single
+  fold_means(own, room->of_blocks, room->even);
+}
+
 /* One piece of up to four columns: out += C gain and partial += C' in. */
 static void pass_piece(const clt_pass_kernels *kernels, const float *const column[CLT_PLAIN_ROWS], size_t columns,
                        size_t count, const double *gain, const double *in, double *out, double *partial) {
@@ -170,13 +182,7 @@ static void blocks_apply(const clt_transport *transport, int channel, const doub
   workspace room = begin_turn(transport, channel);
 #pragma omp parallel if (is_worth_sharing(transport))
   {
-#pragma omp for schedule(dynamic, 1)
-    for (size_t k = 0; k < SLICES; k++) {
-      const slice of = slice_of(transport, &room, k);
-      sum_blocks(own, &of, x, true, of.of_blocks);
-    }
-#pragma omp single
-    fold_means(own, room.of_blocks, room.even);
+    find_even(transport, &room, x, true);
 #pragma omp for schedule(dynamic, 1)
     for (size_t k = 0; k < SLICES; k++) {
       const slice of = slice_of(transport, &room, k);
@@ -202,13 +208,7 @@ static void blocks_apply_transposed(const clt_transport *transport, int channel,
   workspace room = begin_turn(transport, channel);
 #pragma omp parallel if (is_worth_sharing(transport))
   {
-#pragma omp for schedule(dynamic, 1)
-    for (size_t k = 0; k < SLICES; k++) {
-      const slice of = slice_of(transport, &room, k);
-      sum_blocks(own, &of, y, false, of.of_blocks);
-    }
-#pragma omp single
-    fold_means(own, room.of_blocks, room.even);
+    find_even(transport, &room, y, false);
 #pragma omp for schedule(dynamic, 1)
     for (size_t k = 0; k < SLICES; k++) {
       const slice of = slice_of(transport, &room, k);
@@ -244,11 +244,7 @@ static void blocks_diagonal(const clt_transport *transport, int channel, double 
   for (size_t i = 0; i < transport->cols; i++) {
     room.cells[i] = (double)column_of(transport, channel, (size_t)own->block[i])[i];
   }
-  for (size_t k = 0; k < SLICES; k++) {
-    const slice of = slice_of(transport, &room, k);
-    sum_blocks(own, &of, room.cells, true, of.of_blocks);
-  }
-  fold_means(own, room.of_blocks, room.even);
+  find_even(transport, &room, room.cells, true);
   for (size_t i = 0; i < transport->rows; i++) {
     const int32_t a = own->block[i];
     double entry = (double)own->flux[i] * own->inverse[a] * (2 * room.cells[i] - room.even[a]);
