@@ -6,9 +6,8 @@
 
 #include "transport/kernels.h"
 
-/* A product walks down slices of cells, their number fixed so that sums do not depend on the number of threads, in
- * pieces that stay in the cache while the columns pass. */
-enum { SLICES = 16, PIECE = 8192 };
+/* A product walks down slices of cells in pieces that stay in the cache while the columns pass. */
+enum { SLICES = CLT_SLICES, PIECE = 8192 };
 enum { WORTH_SHARING = 16384 }; /* values of the columns from which threads pay */
 
 /* scratch: twice SLICES x K partial sums, twice K sums, N values */
@@ -20,7 +19,7 @@ typedef struct workspace {
 
 /* The cells first <= j < end. */
 typedef struct slice {
-  size_t first, end;
+  size_t number, first, end;
   double *partial, *of_blocks; /* K, its own */
 } slice;
 
@@ -46,8 +45,9 @@ static void end_turn(const clt_transport *transport, int channel) {
 
 static slice slice_of(const clt_transport *transport, const workspace *room, size_t number) {
   const clt_block_storage *own = transport->storage;
-  return (slice){.first = transport->cols * number / SLICES,
-                 .end = transport->cols * (number + 1) / SLICES,
+  return (slice){.number = number,
+                 .first = clt_slice_first(transport->cols, number),
+                 .end = clt_slice_first(transport->cols, number + 1),
                  .partial = room->partial + number * own->count,
                  .of_blocks = room->of_blocks + number * own->count};
 }
@@ -60,6 +60,11 @@ static bool is_worth_sharing(const clt_transport *transport) {
 static const float *column_of(const clt_transport *transport, int channel, size_t b) {
   const clt_block_storage *own = transport->storage;
   return own->column + ((size_t)channel * own->count + b) * transport->cols;
+}
+
+static const float *own_of(const clt_transport *transport, int channel) {
+  const clt_block_storage *own = transport->storage;
+  return own->own + (size_t)channel * transport->cols;
 }
 
 static const float *near_of(const clt_transport *transport, int channel) {
@@ -83,24 +88,18 @@ static void fold_means(const clt_block_storage *own, const double *partial, doub
   }
 }
 
-/* The sums of a slice's values over every block, weighted by the flux where it is asked for. Cells of a block lie side
- * by side: a sum is added to once a run. */
+/* The sums of a slice's values over every block, weighted by the flux where it is asked for. */
 static void sum_blocks(const clt_block_storage *own, const slice *of, const double *values, bool weighted,
                        double *sums) {
   memset(sums, 0, own->count * sizeof *sums);
-  for (size_t first = of->first; first < of->end;) {
-    const int32_t block = own->block[first];
-    size_t end = first + 1;
-    while (end < of->end && own->block[end] == block) {
-      end++;
-    }
+  for (size_t k = own->first_run[of->number]; k < own->first_run[of->number + 1]; k++) {
+    const int32_t end = own->run[k + 1].first;
     double sum = 0;
 #pragma omp simd reduction(+ : sum)
-    for (size_t j = first; j < end; j++) {
+    for (int32_t j = own->run[k].first; j < end; j++) {
       sum += weighted ? (double)own->flux[j] * values[j] : values[j];
     }
-    sums[block] += sum;
-    first = end;
+    sums[own->run[k].block] += sum;
   }
 }
 
@@ -146,32 +145,37 @@ static void pass_columns(const clt_transport *transport, int channel, const slic
   }
 }
 
-/* Of a slice: y = near x. */
-static void apply_near(const clt_transport *transport, int channel, const slice *of, const double *x, double *y) {
+/* Of a slice: y = own x, uneven = W (x - P even). */
+static void begin_slice(const clt_transport *transport, const float *near, const slice *of, const double *even,
+                        const double *x, double *y, double *uneven) {
   const clt_block_storage *own = transport->storage;
-  const float *value = near_of(transport, channel);
-  for (size_t i = of->first; i < of->end; i++) {
-    double sum = 0;
-    for (int64_t e = own->start[i]; e < own->start[i + 1]; e++) {
-      sum += (double)value[e] * x[own->cell[e]];
+  for (size_t k = own->first_run[of->number]; k < own->first_run[of->number + 1]; k++) {
+    const double mean = even[own->run[k].block];
+    for (int32_t j = own->run[k].first; j < own->run[k + 1].first; j++) {
+      y[j] = (double)near[j] * x[j];
+      uneven[j] = (double)own->flux[j] * (x[j] - mean);
     }
-    y[i] = sum;
   }
 }
 
-/* Of a slice: x += near' y, from the rows that reach it. */
-static void add_near_transposed(const clt_transport *transport, int channel, const slice *of, const double *y,
-                                double *x) {
+/* Of a slice: y += P total. */
+static void add_total(const clt_block_storage *own, const slice *of, const double *total, double *y) {
+  for (size_t k = own->first_run[of->number]; k < own->first_run[of->number + 1]; k++) {
+    const double here = total[own->run[k].block];
+    for (int32_t j = own->run[k].first; j < own->run[k + 1].first; j++) {
+      y[j] += here;
+    }
+  }
+}
+
+/* Of a slice: x = own y + W (P total + cells). */
+static void end_slice(const clt_transport *transport, const float *near, const slice *of, const workspace *room,
+                      const double *y, double *x) {
   const clt_block_storage *own = transport->storage;
-  const float *value = near_of(transport, channel);
-  const size_t first = of->first > own->reach ? of->first - own->reach : 0;
-  const size_t end = transport->rows - of->end > own->reach ? of->end + own->reach : transport->rows;
-  for (size_t i = first; i < end; i++) {
-    for (int64_t e = own->start[i]; e < own->start[i + 1]; e++) {
-      const size_t j = (size_t)own->cell[e];
-      if (j >= of->first && j < of->end) {
-        x[j] += (double)value[e] * y[i];
-      }
+  for (size_t k = own->first_run[of->number]; k < own->first_run[of->number + 1]; k++) {
+    const double here = room->total[own->run[k].block];
+    for (int32_t j = own->run[k].first; j < own->run[k + 1].first; j++) {
+      x[j] = (double)near[j] * y[j] + (double)own->flux[j] * (here + room->cells[j]);
     }
   }
 }
@@ -179,6 +183,7 @@ static void add_near_transposed(const clt_transport *transport, int channel, con
 /* e_b the mean of x over b by flux, u = W (x - P e), z = C' u:  y = near x + C e + P D^-1 z */
 static void blocks_apply(const clt_transport *transport, int channel, const double *x, double *y) {
   const clt_block_storage *own = transport->storage;
+  const float *near = own_of(transport, channel);
   workspace room = begin_turn(transport, channel);
 #pragma omp parallel if (is_worth_sharing(transport))
   {
@@ -186,17 +191,16 @@ static void blocks_apply(const clt_transport *transport, int channel, const doub
 #pragma omp for schedule(dynamic, 1)
     for (size_t k = 0; k < SLICES; k++) {
       const slice of = slice_of(transport, &room, k);
-      apply_near(transport, channel, &of, x, y);
-      for (size_t j = of.first; j < of.end; j++) {
-        room.cells[j] = (double)own->flux[j] * (x[j] - room.even[own->block[j]]);
-      }
+      begin_slice(transport, near, &of, room.even, x, y, room.cells);
+      clt_near_stream_add(&own->near, channel, k, x, y);
       pass_columns(transport, channel, &of, room.even, room.cells, y);
     }
 #pragma omp single
     fold_means(own, room.partial, room.total);
-#pragma omp for schedule(static)
-    for (size_t i = 0; i < transport->rows; i++) {
-      y[i] += room.total[own->block[i]];
+#pragma omp for schedule(dynamic, 1)
+    for (size_t k = 0; k < SLICES; k++) {
+      const slice of = slice_of(transport, &room, k);
+      add_total(own, &of, room.total, y);
     }
   }
   end_turn(transport, channel);
@@ -205,6 +209,7 @@ static void blocks_apply(const clt_transport *transport, int channel, const doub
 /* q = D^-1 P' y, p = C' y, v = C q, v_b the mean of v over b by flux:  x = near' y + W (P D^-1 p + v - P v_b) */
 static void blocks_apply_transposed(const clt_transport *transport, int channel, const double *y, double *x) {
   const clt_block_storage *own = transport->storage;
+  const float *near = own_of(transport, channel);
   workspace room = begin_turn(transport, channel);
 #pragma omp parallel if (is_worth_sharing(transport))
   {
@@ -227,11 +232,9 @@ static void blocks_apply_transposed(const clt_transport *transport, int channel,
 #pragma omp for schedule(dynamic, 1)
     for (size_t k = 0; k < SLICES; k++) {
       const slice of = slice_of(transport, &room, k);
-      for (size_t j = of.first; j < of.end; j++) {
-        x[j] = (double)own->flux[j] * (room.total[own->block[j]] + room.cells[j]);
-      }
-      add_near_transposed(transport, channel, &of, y, x);
+      end_slice(transport, near, &of, &room, y, x);
     }
+    clt_near_stream_add_transposed(&own->near, channel, y, x);
   }
   end_turn(transport, channel);
 }
@@ -275,10 +278,9 @@ static void blocks_row_sums(const clt_transport *transport, int channel, double 
 
 static size_t blocks_bytes(const clt_transport *transport) {
   const clt_block_storage *own = transport->storage;
-  const size_t entries = (size_t)own->start[transport->rows], cells = transport->cols;
-  const size_t pattern = entries * sizeof *own->cell + (cells + 1) * sizeof *own->start;
-  const size_t per_cell = sizeof *own->block + sizeof *own->flux + own->count * sizeof *own->column;
-  return (size_t)transport->channels * (pattern + entries * sizeof *own->value + cells * per_cell);
+  const size_t per_cell = sizeof *own->flux + sizeof *own->own + own->count * sizeof *own->column;
+  const size_t runs = own->first_run[CLT_SLICES] * sizeof *own->run;
+  return (size_t)transport->channels * (clt_near_stream_bytes(&own->near) + runs + transport->cols * per_cell);
 }
 
 static float *blocks_entries(const clt_transport *transport, int channel) {

@@ -14,6 +14,12 @@
 #include <pthread.h>
 
 #include "transport/kind.h"
+#include "transport/near_stream.h"
+
+/* Cells of one block side by side: from `first` to the first of the next. */
+typedef struct clt_run {
+  int32_t first, block;
+} clt_run;
 
 typedef struct clt_block_storage {
   size_t count;                           /* K */
@@ -23,7 +29,10 @@ typedef struct clt_block_storage {
   int64_t *start;                         /* N + 1: near by compressed rows; every channel has the same pattern */
   int32_t *cell;                          /* entries */
   float *value;                           /* channels x entries */
-  size_t reach;                           /* the most that the numbers of two cells with a near entry differ by */
+  float *own;                             /* channels x N: near light of cells to themselves, as products read it */
+  clt_near_stream near;                   /* and all other near light */
+  clt_run *run;                           /* that share out the cells; none crosses slices (transport/near_stream.h) */
+  size_t first_run[CLT_SLICES + 1];       /* of each slice */
   double *inverse;                        /* K: 1 / D_b; 0 for a block without flux */
   double *scratch;                        /* per channel: room for a product; see blocks.c */
   pthread_mutex_t turn[CLT_CHANNELS_MAX]; /* products of one channel take turns */

@@ -56,15 +56,30 @@ static clt_status begin(clt_transport *transport, size_t count, const char *sour
   return clt_transport_set_rows(transport, transport->cols, source, error);
 }
 
-static size_t find_reach(const clt_block_storage *own, size_t cells) {
-  int64_t reach = 0;
-  for (size_t i = 0; i < cells; i++) {
-    for (int64_t e = own->start[i]; e < own->start[i + 1]; e++) {
-      const int64_t apart = llabs((int64_t)own->cell[e] - (int64_t)i);
-      reach = apart > reach ? apart : reach;
+/* Shares out the cells into runs; behind them stands one without cells. */
+static clt_status find_runs(clt_block_storage *own, size_t cells, const char *source, clt_error *error) {
+  size_t count = 0;
+  for (int pass = 0; pass < 2; pass++) { /* counts them, then notes them */
+    count = 0;
+    for (size_t slice = 0; slice < CLT_SLICES; slice++) {
+      const size_t first = clt_slice_first(cells, slice), end = clt_slice_first(cells, slice + 1);
+      own->first_run[slice] = count;
+      for (size_t j = first; j < end; j++) {
+        if (j == first || own->block[j] != own->block[j - 1]) {
+          if (pass == 1) {
+            own->run[count] = (clt_run){(int32_t)j, own->block[j]};
+          }
+          count++;
+        }
+      }
+    }
+    own->first_run[CLT_SLICES] = count;
+    if (pass == 0 && (own->run = clt_alloc(count + 1, sizeof *own->run)) == NULL) {
+      return clt_fail(error, CLT_FAILED, "%s: no memory for the blocks of %zu cells", source, cells);
     }
   }
-  return (size_t)reach;
+  own->run[count] = (clt_run){(int32_t)cells, 0};
+  return CLT_OK;
 }
 
 /* Makes storage that has all its arrays ready for products. */
@@ -75,10 +90,19 @@ static clt_status finish(clt_transport *transport, size_t entries, const char *s
   if (status == CLT_OK) {
     status = clt_check_near(source, "/blocks", own->start, own->cell, cells, entries, error);
   }
+  own->own = clt_alloc(cells, channels * sizeof *own->own);
+  if (status == CLT_OK && own->own == NULL) {
+    status = clt_fail(error, CLT_FAILED, "%s: no memory for %zu cells", source, cells);
+  }
+  if (status == CLT_OK) {
+    status = clt_near_stream_make(cells, channels, own->start, own->cell, own->value, own->own, &own->near, error);
+  }
+  if (status == CLT_OK) {
+    status = find_runs(own, cells, source, error);
+  }
   if (status != CLT_OK) {
     return status;
   }
-  own->reach = find_reach(own, cells);
   own->inverse = clt_alloc(own->count, sizeof *own->inverse);
   own->scratch = clt_alloc(clt_block_scratch(cells, own->count), channels * sizeof *own->scratch);
   if (own->inverse == NULL || own->scratch == NULL) {
@@ -107,6 +131,9 @@ void clt_blocks_destroy(clt_transport *transport) {
   free(own->start);
   free(own->cell);
   free(own->value);
+  free(own->own);
+  clt_near_stream_finish(&own->near);
+  free(own->run);
   free(own->inverse);
   free(own->scratch);
   free(own);

@@ -12,6 +12,32 @@ typedef struct side {
   const float *cells, *factor;
 } side;
 
+/* Numbers of the cells (step 1), or of one row that stands for every span (step 0). */
+typedef struct plane {
+  const float *first;
+  size_t step;
+} plane;
+
+/* A product of one channel: out = own in + flood mean + diag(to) P to.factor from.factor' P' diag(from) in, with
+ * N mean = weight' in. */
+typedef struct product {
+  const clt_transport *transport;
+  int channel;
+  side from, to;
+  plane weight, flood;
+  const double *in;
+  size_t in_step;
+  double *out;
+  double *z, *chunks;              /* R + 1 sums over the leaves, and CLT_HIERARCHY_CHUNKS times as many */
+  double *leaf_sums, *part_sums;   /* CLT_LEAF_SUMS of each leaf and part */
+  double *leaf_light, *part_light; /* f: CLT_LEAF_TERMS of each */
+} product;
+
+static const float EVEN[CLT_LEAF_SIDE_MAX] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+                                              1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+static const double EVEN_DRIVE[CLT_LEAF_SIDE_MAX] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
+                                                     1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+
 const clt_hierarchy_storage *clt_hierarchic_of(const clt_transport *transport) {
   return transport->kind == &clt_kind_hierarchy ? transport->storage : NULL;
 }
@@ -27,133 +53,185 @@ static side side_of(const clt_transport *transport, int channel, const float *ce
                 factor + (size_t)channel * CLT_LEAF_TERMS * own->leaves * own->rank};
 }
 
-static void fill_places(int32_t count, double *u) {
-  for (int32_t k = 0; k < count; k++) {
-    u[k] = clt_leaf_place(k, count);
-  }
-}
-
-/* m = P' diag(cells) x over one leaf; x = NULL stands for 1 everywhere. Sums are kept by columns, so that the loop over
- * a row is a map. */
-static void sum_leaf(const clt_leaf *leaf, int width, const float *cells, const double *x, double m[CLT_LEAF_TERMS]) {
-  double even[CLT_LEAF_SIDE_MAX] = {0}, tilted[CLT_LEAF_SIDE_MAX] = {0}, u[CLT_LEAF_SIDE_MAX];
-  for (int32_t row = 0; row < leaf->height; row++) {
-    const size_t first = (size_t)(leaf->y + row) * (size_t)width + (size_t)leaf->x;
-    const double v = clt_leaf_place(row, leaf->height);
-    for (int32_t k = 0; k < leaf->width; k++) {
-      const double value = (double)cells[first + (size_t)k] * (x != NULL ? x[first + (size_t)k] : 1);
-      even[k] += value;
-      tilted[k] += v * value;
-    }
-  }
-  fill_places(leaf->width, u);
-  memset(m, 0, CLT_LEAF_TERMS * sizeof *m);
-  for (int32_t k = 0; k < leaf->width; k++) {
-    m[0] += even[k];
-    m[1] += even[k] * u[k];
-    m[2] += tilted[k];
-    m[3] += tilted[k] * u[k];
-  }
-}
-
-/* y += diag(cells) P f over one leaf. */
-static void spread_leaf(const clt_leaf *leaf, int width, const float *cells, const double f[CLT_LEAF_TERMS],
-                        double *y) {
-  double u[CLT_LEAF_SIDE_MAX];
-  fill_places(leaf->width, u);
-  for (int32_t row = 0; row < leaf->height; row++) {
-    const size_t first = (size_t)(leaf->y + row) * (size_t)width + (size_t)leaf->x;
-    const double v = clt_leaf_place(row, leaf->height), even = f[0] + v * f[2], tilted = f[1] + v * f[3];
-    for (int32_t k = 0; k < leaf->width; k++) {
-      y[first + (size_t)k] += (double)cells[first + (size_t)k] * (even + tilted * u[k]);
-    }
-  }
-}
-
 static void rows_of(const float *factor, size_t leaf, size_t rank, const float *row[CLT_PLAIN_ROWS]) {
   for (size_t term = 0; term < CLT_LEAF_TERMS; term++) {
     row[term] = factor + (CLT_LEAF_TERMS * leaf + term) * rank;
   }
 }
 
-/* y += diag(to) P to.factor from.factor' P' diag(from) x */
-static void far_product(const clt_transport *transport, int channel, side from, side to, const double *x, double *y) {
-  const clt_hierarchy_storage *own = transport->storage;
-  const clt_plain_kernels *kernels = clt_plain_choose();
-  const size_t leaves = own->leaves, rank = own->rank;
-  double *z = own->scratch + (size_t)channel * (CLT_HIERARCHY_CHUNKS + 1) * rank, *part = z + rank;
-  memset(z, 0, (CLT_HIERARCHY_CHUNKS + 1) * rank * sizeof *z);
-#pragma omp parallel for schedule(dynamic, 1) if (transport->cols >= WORTH_SHARING)
-  for (size_t chunk = 0; chunk < CLT_HIERARCHY_CHUNKS; chunk++) {
-    for (size_t leaf = leaves * chunk / CLT_HIERARCHY_CHUNKS; leaf < leaves * (chunk + 1) / CLT_HIERARCHY_CHUNKS;
-         leaf++) {
-      const float *row[CLT_PLAIN_ROWS];
-      double m[CLT_LEAF_TERMS];
-      sum_leaf(&own->leaf[leaf], transport->width, from.cells, x, m);
-      rows_of(from.factor, leaf, rank, row);
-      kernels->add_float(row, m, rank, part + chunk * rank);
+size_t clt_hierarchic_scratch(const clt_hierarchy_storage *own) {
+  const size_t parts = own->spans.first_part[CLT_SLICES];
+  return (CLT_HIERARCHY_CHUNKS + 1) * (own->rank + 1) + (CLT_LEAF_SUMS + CLT_LEAF_TERMS) * (own->leaves + parts);
+}
+
+/* T in, or T' in; in turn with other products of the channel until end_turn. */
+static product begin_turn(const clt_transport *transport, int channel, bool transposed) {
+  clt_hierarchy_storage *own = transport->storage;
+  const side gather = side_of(transport, channel, own->gather, own->right);
+  const side scale = side_of(transport, channel, own->scale, own->left);
+  const plane flood = {own->flood + (size_t)channel * transport->cols, 1}, even = {EVEN, 0};
+  pthread_mutex_lock(&own->turn[channel]);
+  product of = {.transport = transport,
+                .channel = channel,
+                .from = transposed ? scale : gather,
+                .to = transposed ? gather : scale,
+                .weight = transposed ? flood : even,
+                .flood = transposed ? even : flood,
+                .in_step = 1,
+                .z = own->scratch + (size_t)channel * clt_hierarchic_scratch(own)};
+  of.chunks = of.z + own->rank + 1;
+  of.leaf_sums = of.chunks + CLT_HIERARCHY_CHUNKS * (own->rank + 1);
+  of.part_sums = of.leaf_sums + CLT_LEAF_SUMS * own->leaves;
+  of.leaf_light = of.part_sums + CLT_LEAF_SUMS * own->spans.first_part[CLT_SLICES];
+  of.part_light = of.leaf_light + CLT_LEAF_TERMS * own->leaves;
+  return of;
+}
+
+static void end_turn(const product *of) {
+  clt_hierarchy_storage *own = of->transport->storage;
+  pthread_mutex_unlock(&own->turn[of->channel]);
+}
+
+/* The sums of a slice's parts of leaves. */
+static void sum_slice(const product *of, size_t slice) {
+  const clt_hierarchy_storage *own = of->transport->storage;
+  const clt_leaf_spans *spans = &own->spans;
+  const clt_leaf_in in = {.place = spans->place,
+                          .x = of->in,
+                          .cells = of->from.cells,
+                          .weight = of->weight.first,
+                          .x_step = of->in_step,
+                          .weight_step = of->weight.step};
+  double *sums = of->part_sums + CLT_LEAF_SUMS * spans->first_part[slice];
+  memset(sums, 0, CLT_LEAF_SUMS * (spans->first_part[slice + 1] - spans->first_part[slice]) * sizeof *sums);
+  clt_leaf_choose()->sum(&in, spans->span + spans->first_span[slice],
+                         spans->first_span[slice + 1] - spans->first_span[slice], sums);
+}
+
+static void fold_parts(const product *of) {
+  const clt_hierarchy_storage *own = of->transport->storage;
+  memset(of->leaf_sums, 0, CLT_LEAF_SUMS * own->leaves * sizeof *of->leaf_sums);
+  for (size_t part = 0; part < own->spans.first_part[CLT_SLICES]; part++) {
+    double *sums = of->leaf_sums + CLT_LEAF_SUMS * (size_t)own->spans.leaf[part];
+    for (size_t term = 0; term < CLT_LEAF_SUMS; term++) {
+      sums[term] += of->part_sums[CLT_LEAF_SUMS * part + term];
     }
-  }
-  for (size_t k = 0; k < CLT_HIERARCHY_CHUNKS * rank; k++) {
-    z[k % rank] += part[k];
-  }
-#pragma omp parallel for schedule(dynamic, 8) if (transport->cols >= WORTH_SHARING)
-  for (size_t leaf = 0; leaf < leaves; leaf++) {
-    const float *row[CLT_PLAIN_ROWS];
-    double f[CLT_LEAF_TERMS];
-    rows_of(to.factor, leaf, rank, row);
-    kernels->dot_float(row, z, rank, f);
-    spread_leaf(&own->leaf[leaf], transport->width, to.cells, f, y);
   }
 }
 
-static double mean_of(const double *values, size_t count) {
-  double sum = 0;
-  for (size_t j = 0; j < count; j++) {
-    sum += values[j];
+/* from.factor' m over a chunk of the leaves, and behind it weight' in. */
+static void gather_chunk(const product *of, size_t chunk) {
+  const clt_hierarchy_storage *own = of->transport->storage;
+  const clt_plain_kernels *kernels = clt_plain_choose();
+  const size_t end = own->leaves * (chunk + 1) / CLT_HIERARCHY_CHUNKS;
+  double *sums = of->chunks + chunk * (own->rank + 1);
+  memset(sums, 0, (own->rank + 1) * sizeof *sums);
+  for (size_t leaf = own->leaves * chunk / CLT_HIERARCHY_CHUNKS; leaf < end; leaf++) {
+    const double *m = of->leaf_sums + CLT_LEAF_SUMS * leaf;
+    const float *row[CLT_PLAIN_ROWS];
+    rows_of(of->from.factor, leaf, own->rank, row);
+    kernels->add_float(row, m, own->rank, sums);
+    sums[own->rank] += m[CLT_LEAF_TERMS];
   }
-  return sum / (double)count;
+}
+
+static void fold_chunks(const product *of) {
+  const clt_hierarchy_storage *own = of->transport->storage;
+  const size_t terms = own->rank + 1;
+  memset(of->z, 0, terms * sizeof *of->z);
+  for (size_t chunk = 0; chunk < CLT_HIERARCHY_CHUNKS; chunk++) {
+    for (size_t k = 0; k < terms; k++) {
+      of->z[k] += of->chunks[chunk * terms + k];
+    }
+  }
+}
+
+/* f = to.factor z of a chunk of the leaves. */
+static void light_chunk(const product *of, size_t chunk) {
+  const clt_hierarchy_storage *own = of->transport->storage;
+  const clt_plain_kernels *kernels = clt_plain_choose();
+  const size_t end = own->leaves * (chunk + 1) / CLT_HIERARCHY_CHUNKS;
+  for (size_t leaf = own->leaves * chunk / CLT_HIERARCHY_CHUNKS; leaf < end; leaf++) {
+    const float *row[CLT_PLAIN_ROWS];
+    rows_of(of->to.factor, leaf, own->rank, row);
+    kernels->dot_float(row, of->z, own->rank, of->leaf_light + CLT_LEAF_TERMS * leaf);
+  }
+}
+
+/* z and what the leaves give out, by every thread of a team. */
+static void light_leaves(const product *of) {
+#pragma omp for schedule(dynamic, 1)
+  for (size_t slice = 0; slice < CLT_SLICES; slice++) {
+    sum_slice(of, slice);
+  }
+#pragma omp single
+  fold_parts(of);
+#pragma omp for schedule(dynamic, 1)
+  for (size_t chunk = 0; chunk < CLT_HIERARCHY_CHUNKS; chunk++) {
+    gather_chunk(of, chunk);
+  }
+#pragma omp single
+  fold_chunks(of);
+#pragma omp for schedule(dynamic, 1)
+  for (size_t chunk = 0; chunk < CLT_HIERARCHY_CHUNKS; chunk++) {
+    light_chunk(of, chunk);
+  }
+}
+
+/* out over the cells of a slice. */
+static void spread_slice(const product *of, size_t slice) {
+  const clt_hierarchy_storage *own = of->transport->storage;
+  const clt_leaf_spans *spans = &own->spans;
+  const clt_leaf_out out = {.place = spans->place,
+                            .x = of->in,
+                            .own = own->own + (size_t)of->channel * of->transport->cols,
+                            .flood = of->flood.first,
+                            .cells = of->to.cells,
+                            .x_step = of->in_step,
+                            .flood_step = of->flood.step,
+                            .mean = of->z[own->rank] / (double)of->transport->cols,
+                            .f = of->part_light + CLT_LEAF_TERMS * spans->first_part[slice],
+                            .y = of->out};
+  for (size_t part = spans->first_part[slice]; part < spans->first_part[slice + 1]; part++) {
+    memcpy(of->part_light + CLT_LEAF_TERMS * part, of->leaf_light + CLT_LEAF_TERMS * (size_t)spans->leaf[part],
+           CLT_LEAF_TERMS * sizeof *of->part_light);
+  }
+  clt_leaf_choose()->spread(&out, spans->span + spans->first_span[slice],
+                            spans->first_span[slice + 1] - spans->first_span[slice]);
 }
 
 static void hierarchy_apply(const clt_transport *transport, int channel, const double *x, double *y) {
-  clt_hierarchy_storage *own = transport->storage;
-  const size_t cells = transport->cols, at = (size_t)channel * cells;
-  const float *value = own->value + (size_t)channel * (size_t)own->start[cells];
-  const double mean = mean_of(x, cells);
-#pragma omp parallel for schedule(static) if (cells >= WORTH_SHARING)
-  for (size_t i = 0; i < cells; i++) {
-    double sum = (double)own->own[at + i] * x[i] + (double)own->flood[at + i] * mean;
-    for (int64_t e = own->start[i]; e < own->start[i + 1]; e++) {
-      sum += (double)value[e] * x[own->cell[e]];
+  const clt_hierarchy_storage *own = transport->storage;
+  product of = begin_turn(transport, channel, false);
+  of.in = x;
+  of.out = y;
+#pragma omp parallel if (transport->cols >= WORTH_SHARING)
+  {
+    light_leaves(&of);
+#pragma omp for schedule(dynamic, 1)
+    for (size_t slice = 0; slice < CLT_SLICES; slice++) {
+      spread_slice(&of, slice);
+      clt_near_stream_add(&own->near, channel, slice, x, y);
     }
-    y[i] = sum;
   }
-  pthread_mutex_lock(&own->turn[channel]);
-  far_product(transport, channel, side_of(transport, channel, own->gather, own->right),
-              side_of(transport, channel, own->scale, own->left), x, y);
-  pthread_mutex_unlock(&own->turn[channel]);
+  end_turn(&of);
 }
 
 static void hierarchy_apply_transposed(const clt_transport *transport, int channel, const double *y, double *x) {
-  clt_hierarchy_storage *own = transport->storage;
-  const size_t cells = transport->cols, at = (size_t)channel * cells;
-  const float *value = own->value + (size_t)channel * (size_t)own->start[cells];
-  double flood = 0;
-  for (size_t i = 0; i < cells; i++) {
-    flood += (double)own->flood[at + i] * y[i];
-  }
-  for (size_t j = 0; j < cells; j++) {
-    x[j] = (double)own->own[at + j] * y[j] + flood / (double)cells;
-  }
-  for (size_t i = 0; i < cells; i++) {
-    for (int64_t e = own->start[i]; y[i] != 0 && e < own->start[i + 1]; e++) {
-      x[own->cell[e]] += (double)value[e] * y[i];
+  const clt_hierarchy_storage *own = transport->storage;
+  product of = begin_turn(transport, channel, true);
+  of.in = y;
+  of.out = x;
+#pragma omp parallel if (transport->cols >= WORTH_SHARING)
+  {
+    light_leaves(&of);
+#pragma omp for schedule(dynamic, 1)
+    for (size_t slice = 0; slice < CLT_SLICES; slice++) {
+      spread_slice(&of, slice);
     }
+    clt_near_stream_add_transposed(&own->near, channel, y, x);
   }
-  pthread_mutex_lock(&own->turn[channel]);
-  far_product(transport, channel, side_of(transport, channel, own->scale, own->left),
-              side_of(transport, channel, own->gather, own->right), y, x);
-  pthread_mutex_unlock(&own->turn[channel]);
+  end_turn(&of);
 }
 
 /* core = left right' of one leaf with itself. */
@@ -193,28 +271,38 @@ static void hierarchy_diagonal(const clt_transport *transport, int channel, doub
   }
 }
 
+/* T 1. */
 static void hierarchy_row_sums(const clt_transport *transport, int channel, double *sums) {
-  clt_hierarchy_storage *own = transport->storage;
-  const size_t cells = transport->cols, at = (size_t)channel * cells;
-  const float *value = own->value + (size_t)channel * (size_t)own->start[cells];
-  for (size_t i = 0; i < cells; i++) {
-    sums[i] = (double)own->own[at + i] + (double)own->flood[at + i];
-    for (int64_t e = own->start[i]; e < own->start[i + 1]; e++) {
-      sums[i] += (double)value[e];
+  const clt_hierarchy_storage *own = transport->storage;
+  const float *value = own->value + (size_t)channel * (size_t)own->start[transport->cols];
+  product of = begin_turn(transport, channel, false);
+  of.in = EVEN_DRIVE;
+  of.in_step = 0;
+  of.out = sums;
+#pragma omp parallel if (transport->cols >= WORTH_SHARING)
+  {
+    light_leaves(&of);
+#pragma omp for schedule(dynamic, 1)
+    for (size_t slice = 0; slice < CLT_SLICES; slice++) {
+      spread_slice(&of, slice);
+    }
+#pragma omp for schedule(static)
+    for (size_t i = 0; i < transport->cols; i++) {
+      for (int64_t e = own->start[i]; e < own->start[i + 1]; e++) {
+        sums[i] += (double)value[e];
+      }
     }
   }
-  pthread_mutex_lock(&own->turn[channel]);
-  far_product(transport, channel, side_of(transport, channel, own->gather, own->right),
-              side_of(transport, channel, own->scale, own->left), NULL, sums);
-  pthread_mutex_unlock(&own->turn[channel]);
+  end_turn(&of);
 }
 
+/* Spans are read twice. */
 static size_t hierarchy_bytes(const clt_transport *transport) {
   const clt_hierarchy_storage *own = transport->storage;
-  const size_t entries = (size_t)own->start[transport->cols], cells = transport->cols;
-  const size_t pattern = entries * sizeof *own->cell + (cells + 1) * sizeof *own->start;
   const size_t factors = 2 * CLT_LEAF_TERMS * own->leaves * own->rank;
-  return (size_t)transport->channels * (pattern + (entries + factors + 4 * cells) * sizeof(float));
+  const size_t spans = 2 * own->spans.first_span[CLT_SLICES] * sizeof *own->spans.span;
+  return (size_t)transport->channels *
+         (clt_near_stream_bytes(&own->near) + spans + (factors + 4 * transport->cols) * sizeof(float));
 }
 
 static float *hierarchy_entries(const clt_transport *transport, int channel) {

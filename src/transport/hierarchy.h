@@ -14,17 +14,29 @@
 
 #include <pthread.h>
 
+#include "transport/kernels.h"
 #include "transport/kind.h"
+#include "transport/near_stream.h"
 
 enum {
   CLT_LEAF_TERMS = 4,
   CLT_LEAF_SIDE_MAX = 32,
-  CLT_HIERARCHY_CHUNKS = 8 /* of leaves, so that sums do not depend on the number of threads */
+  CLT_HIERARCHY_CHUNKS = 16 /* of leaves, so that sums do not depend on the number of threads */
 };
 
 typedef struct clt_leaf {
   int32_t x, y, width, height;
 } clt_leaf;
+
+/* The cells as products walk over them: in their own order, slice by slice (transport/near_stream.h), each a line of
+ * spans of leaves. A slice's part of a leaf has its own sums. */
+typedef struct clt_leaf_spans {
+  clt_span *span;
+  int32_t *leaf;                     /* of each part */
+  size_t first_span[CLT_SLICES + 1]; /* of each slice */
+  size_t first_part[CLT_SLICES + 1]; /* of each slice; the parts of its spans count from there */
+  double place[(CLT_LEAF_SIDE_MAX + 1) * CLT_LEAF_SIDE_MAX]; /* of cell k of a side: [CLT_LEAF_SIDE_MAX side + k] */
+} clt_leaf_spans;
 
 typedef struct clt_hierarchy_storage {
   size_t leaves, rank; /* L, R */
@@ -33,14 +45,25 @@ typedef struct clt_hierarchy_storage {
   float *scale, *gather, *own, *flood; /* channels x N */
   int64_t *start;                      /* N + 1: near by compressed rows, without the diagonal; one pattern for all */
   int32_t *cell;
-  float *value;    /* channels x entries */
-  double error;    /* relative RMS by which a product differs from that of the transport it was made from */
-  double *scratch; /* per channel: CLT_HIERARCHY_CHUNKS + 1 times R values */
+  float *value;         /* channels x entries */
+  double error;         /* relative RMS by which a product differs from that of the transport it was made from */
+  clt_near_stream near; /* the same entries as products read them */
+  clt_leaf_spans spans;
+  double *scratch;                        /* per channel: clt_hierarchic_scratch */
   pthread_mutex_t turn[CLT_CHANNELS_MAX]; /* products of one channel take turns */
 } clt_hierarchy_storage;
 
 /* The storage of a transport of this kind, or NULL of another. */
 const clt_hierarchy_storage *clt_hierarchic_of(const clt_transport *transport);
+
+/* Doubles of scratch that a channel needs. */
+size_t clt_hierarchic_scratch(const clt_hierarchy_storage *own);
+
+/* The spans of leaves that share out the grid. The caller finishes them, also after a failure (CLT_FAILED: no memory).
+ */
+clt_status clt_leaf_spans_make(const clt_leaf *leaf, size_t leaves, int width, int height, clt_leaf_spans *spans,
+                               clt_error *error);
+void clt_leaf_spans_finish(clt_leaf_spans *spans);
 
 /* Storage without arrays, into transport->storage. */
 clt_status clt_hierarchic_begin(clt_transport *transport, size_t leaves, size_t rank, const char *source,

@@ -82,10 +82,17 @@ clt_status clt_hierarchic_finish(clt_transport *transport, size_t entries, const
   if (status == CLT_OK) {
     status = clt_check_near(source, "/hierarchy", own->start, own->cell, transport->cols, entries, error);
   }
+  if (status == CLT_OK) {
+    status = clt_near_stream_make(transport->cols, (size_t)transport->channels, own->start, own->cell, own->value, NULL,
+                                  &own->near, error);
+  }
+  if (status == CLT_OK) {
+    status = clt_leaf_spans_make(own->leaf, own->leaves, transport->width, transport->height, &own->spans, error);
+  }
   if (status != CLT_OK) {
     return status;
   }
-  own->scratch = clt_alloc((CLT_HIERARCHY_CHUNKS + 1) * own->rank, (size_t)transport->channels * sizeof(double));
+  own->scratch = clt_alloc(clt_hierarchic_scratch(own), (size_t)transport->channels * sizeof *own->scratch);
   if (own->scratch == NULL) {
     return clt_fail(error, CLT_FAILED, "%s: no memory for products over %zu leaves", source, own->leaves);
   }
@@ -110,6 +117,8 @@ void clt_hierarchic_destroy(clt_transport *transport) {
   free(own->start);
   free(own->cell);
   free(own->value);
+  clt_near_stream_finish(&own->near);
+  clt_leaf_spans_finish(&own->spans);
   free(own->scratch);
   free(own);
 }

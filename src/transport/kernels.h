@@ -36,6 +36,39 @@ typedef struct clt_pass_kernels {
                double sum[CLT_PLAIN_ROWS], double *out);
 } clt_pass_kernels;
 
+/* Cells of a row side by side that lie in one leaf of a hierarchy (transport/hierarchy.h): the first of them, which of
+ * the parts of leaves they belong to, how many, and where their u and v stand in the table of places. */
+typedef struct clt_span {
+  int32_t first, part;
+  uint16_t count, u, v;
+} clt_span;
+
+/* Spans are worked through in their order. Planes of the cells have a step of 1; one of step 0 is alike in all spans.
+ */
+enum { CLT_LEAF_SUMS = 5 };
+typedef struct clt_leaf_in {
+  const double *place, *x;
+  const float *cells, *weight;
+  size_t x_step, weight_step;
+} clt_leaf_in;
+typedef struct clt_leaf_out {
+  const double *place, *x;
+  const float *own, *flood, *cells;
+  size_t x_step, flood_step;
+  double mean;
+  const double *f; /* parts x CLT_PLAIN_ROWS */
+  double *y;
+} clt_leaf_out;
+typedef struct clt_leaf_kernels {
+  const char *needs;
+  bool (*runs_here)(void);
+  /* sums, parts x CLT_LEAF_SUMS, += those of cells x, u cells x, v cells x, u v cells x and weight x; over a span in 4
+   * partial sums and one of the cells behind them */
+  void (*sum)(const clt_leaf_in *in, const clt_span *span, size_t spans, double *sums);
+  /* y = (own x + flood mean) + cells (f_0 + u f_1 + v f_2 + u v f_3) */
+  void (*spread)(const clt_leaf_out *out, const clt_span *span, size_t spans);
+} clt_leaf_kernels;
+
 /* IEEE half-precision codes, all of them finite. */
 typedef struct clt_half_kernels {
   const char *needs; /* what the processor must have; NULL: nothing */
@@ -59,11 +92,13 @@ typedef struct clt_byte_kernels {
 /* Every variant, the fastest first, ended by the portable one and NULL. */
 extern const clt_plain_kernels *const clt_plain_variants[];
 extern const clt_pass_kernels *const clt_pass_variants[];
+extern const clt_leaf_kernels *const clt_leaf_variants[];
 extern const clt_half_kernels *const clt_half_variants[];
 extern const clt_byte_kernels *const clt_byte_variants[];
 /* The first that runs here. */
 const clt_plain_kernels *clt_plain_choose(void);
 const clt_pass_kernels *clt_pass_choose(void);
+const clt_leaf_kernels *clt_leaf_choose(void);
 const clt_half_kernels *clt_half_choose(void);
 const clt_byte_kernels *clt_byte_choose(void);
 

@@ -4,8 +4,9 @@
 #include "transport/kernels.h"
 
 enum {
+  LINE = 16,  /* floats of a cache line */
   LANES = 8,  /* partial sums of a column, so that additions do not wait for each other */
-  AHEAD = 256 /* numbers by which memory is asked early: four streams at once are more than it foresees */
+  AHEAD = 128 /* numbers by which memory is asked early: four streams at once are more than it foresees */
 };
 
 /* Adds in a fixed order, whatever the processor. */
@@ -29,33 +30,69 @@ static void pass_rest(const float *const column[CLT_PLAIN_ROWS], const double y[
   }
 }
 
-/* One variant, in vectors of `width` doubles, LANES / width of which make up the partial sums of a column. */
-#define VARIANT(name, width, attributes)                                                                               \
-  typedef double wide_##name __attribute__((vector_size(width * sizeof(double))));                                     \
-  typedef float brief_##name __attribute__((vector_size(width * sizeof(float))));                                      \
+#if defined(__x86_64__)
+#include <immintrin.h>
+
+#define AVX2 __attribute__((target("avx2")))
+#define AVX512 __attribute__((target("avx512f,avx512vl")))
+
+AVX2 static inline __m256d take_avx2(const float *at) {
+  return _mm256_cvtps_pd(_mm_loadu_ps(at));
+}
+
+AVX512 static inline __m512d take_avx512(const float *at) {
+  return _mm512_cvtps_pd(_mm256_loadu_ps(at));
+}
+#endif
+
+typedef double pair __attribute__((vector_size(2 * sizeof(double))));
+static inline pair take_portable(const float *at) {
+  return (pair){(double)at[0], (double)at[1]};
+}
+
+/* One variant, in vectors of `wide` doubles, LANES / wide of which make up the partial sums of a column; AT_ONCE of
+ * them for each time that memory is asked. */
+#define VARIANT(name, wide, attributes)                                                                                \
+  typedef double wide_##name __attribute__((vector_size(wide * sizeof(double))));                                      \
+  attributes static inline void step_##name(const float *const at[CLT_PLAIN_ROWS], const wide_##name *y, size_t k,     \
+                                            const double *x, wide_##name *total, double *out) {                        \
+    wide_##name in, to;                                                                                                \
+    memcpy(&in, x + k, sizeof in);                                                                                     \
+    memcpy(&to, out + k, sizeof to);                                                                                   \
+    const wide_##name a = take_##name(at[0] + k), b = take_##name(at[1] + k);                                          \
+    const wide_##name c = take_##name(at[2] + k), d = take_##name(at[3] + k);                                          \
+    total[0] += a * in;                                                                                                \
+    total[1] += b * in;                                                                                                \
+    total[2] += c * in;                                                                                                \
+    total[3] += d * in;                                                                                                \
+    to += (y[0] * a + y[1] * b) + (y[2] * c + y[3] * d);                                                               \
+    memcpy(out + k, &to, sizeof to);                                                                                   \
+  }                                                                                                                    \
   attributes static void pass_##name(const float *const column[CLT_PLAIN_ROWS], const double y[CLT_PLAIN_ROWS],        \
                                      const double *x, size_t count, double sum[CLT_PLAIN_ROWS], double *out) {         \
-    enum { PARTS = LANES / width };                                                                                    \
-    wide_##name total[CLT_PLAIN_ROWS][PARTS] = {{{0}}};                                                                \
+    const float *const at[CLT_PLAIN_ROWS] = {column[0], column[1], column[2], column[3]};                              \
+    wide_##name factor[CLT_PLAIN_ROWS], total[LANES / wide][CLT_PLAIN_ROWS] = {{{0}}};                                 \
     double lane[CLT_PLAIN_ROWS][LANES];                                                                                \
     size_t k = 0;                                                                                                      \
+    for (size_t r = 0; r < CLT_PLAIN_ROWS; r++) {                                                                      \
+      factor[r] = y[r] - (wide_##name){0};                                                                             \
+    }                                                                                                                  \
     for (; k + LANES <= count; k += LANES) {                                                                           \
-      for (size_t p = 0; p < PARTS; p++) {                                                                             \
-        wide_##name in, to, value[CLT_PLAIN_ROWS];                                                                     \
-        memcpy(&in, x + k + p * width, sizeof in);                                                                     \
-        memcpy(&to, out + k + p * width, sizeof to);                                                                   \
-        for (size_t r = 0; r < CLT_PLAIN_ROWS; r++) {                                                                  \
-          brief_##name code;                                                                                           \
-          __builtin_prefetch(column[r] + k + AHEAD);                                                                   \
-          memcpy(&code, column[r] + k + p * width, sizeof code);                                                       \
-          value[r] = __builtin_convertvector(code, wide_##name);                                                       \
-          total[r][p] += value[r] * in;                                                                                \
-        }                                                                                                              \
-        to += (y[0] * value[0] + y[1] * value[1]) + (y[2] * value[2] + y[3] * value[3]);                               \
-        memcpy(out + k + p * width, &to, sizeof to);                                                                   \
+      if (k % LINE == 0) {                                                                                             \
+        __builtin_prefetch(at[0] + k + AHEAD);                                                                         \
+        __builtin_prefetch(at[1] + k + AHEAD);                                                                         \
+        __builtin_prefetch(at[2] + k + AHEAD);                                                                         \
+        __builtin_prefetch(at[3] + k + AHEAD);                                                                         \
+      }                                                                                                                \
+      for (size_t p = 0; p < LANES / wide; p++) {                                                                      \
+        step_##name(at, factor, k + p * wide, x, total[p], out);                                                       \
       }                                                                                                                \
     }                                                                                                                  \
-    memcpy(lane, total, sizeof lane);                                                                                  \
+    for (size_t p = 0; p < LANES / wide; p++) {                                                                        \
+      for (size_t r = 0; r < CLT_PLAIN_ROWS; r++) {                                                                    \
+        memcpy(lane[r] + p * wide, &total[p][r], sizeof total[p][r]);                                                  \
+      }                                                                                                                \
+    }                                                                                                                  \
     pass_rest(column, y, k, count, x, lane, sum, out);                                                                 \
   }                                                                                                                    \
   static const clt_pass_kernels name = {.needs = NEEDS_##name, .runs_here = has_##name, .pass = pass_##name};
@@ -71,13 +108,13 @@ VARIANT(portable, 2, )
 static bool has_avx2(void) {
   return __builtin_cpu_supports("avx2");
 }
-VARIANT(avx2, 4, __attribute__((target("avx2"))))
+VARIANT(avx2, 4, AVX2)
 
 #define NEEDS_avx512 "AVX-512"
 static bool has_avx512(void) {
   return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl");
 }
-VARIANT(avx512, 8, __attribute__((target("avx512f,avx512vl"))))
+VARIANT(avx512, 8, AVX512)
 
 const clt_pass_kernels *const clt_pass_variants[] = {&avx512, &avx2, &portable, NULL};
 #else

@@ -241,6 +241,62 @@ static void test_pass_variants(void **unused) {
   }
 }
 
+/* Spans of every length, of two parts, against plain sums; every variant to the same bits. */
+static void test_leaf_variants(void **unused) {
+  (void)unused;
+  enum { SIDE = 32, CELLS = SIDE * (SIDE + 1) / 2, PARTS = 2 };
+  static float own[CELLS], flood[CELLS], cells[CELLS];
+  static double x[CELLS], y[2][CELLS], place[SIDE];
+  clt_span span[SIDE];
+  const double f[PARTS * 4] = {0.3, -0.7, 0.1, 1.1, 0.9, 0.2, -0.4, 0.05};
+  double wanted[PARTS][CLT_LEAF_SUMS] = {{0}}, sums[2][PARTS * CLT_LEAF_SUMS] = {{0}};
+  uint64_t state = 7;
+  for (int k = 0; k < CELLS; k++) {
+    own[k] = (float)test_random(&state), flood[k] = (float)test_random(&state), cells[k] = (float)test_random(&state);
+    x[k] = test_random(&state) - 0.5;
+    place[k % SIDE] = (2 * (k % SIDE) + 1) / (double)SIDE - 1;
+  }
+  for (int s = 0, first = 0; s < SIDE; first += ++s) {
+    span[s] = (clt_span){first, s % PARTS, (uint16_t)(s + 1), (uint16_t)(SIDE - 1 - s), (uint16_t)s};
+    for (int k = 0; k <= s; k++) {
+      const double u = place[SIDE - 1 - s + k], v = place[s], light = (double)cells[first + k] * x[first + k];
+      const double term[CLT_LEAF_SUMS] = {light, u * light, v * light, u * v * light,
+                                          (double)flood[first + k] * x[first + k]};
+      for (int t = 0; t < CLT_LEAF_SUMS; t++) {
+        wanted[s % PARTS][t] += term[t];
+      }
+    }
+  }
+  const clt_leaf_in in = {place, x, cells, flood, 1, 1};
+  for (size_t v = 0; clt_leaf_variants[v] != NULL; v++) {
+    if (!clt_leaf_variants[v]->runs_here()) {
+      continue;
+    }
+    const clt_leaf_out out = {place, x, own, flood, cells, 1, 1, 0.6, f, y[1]};
+    memset(sums[1], 0, sizeof sums[1]);
+    clt_leaf_variants[v]->sum(&in, span, SIDE, sums[1]);
+    clt_leaf_variants[v]->spread(&out, span, SIDE);
+    if (v > 0 && clt_leaf_variants[0]->runs_here()) {
+      assert_memory_equal(sums[1], sums[0], sizeof sums[0]);
+      assert_memory_equal(y[1], y[0], sizeof y[0]);
+    }
+    memcpy(sums[0], sums[1], sizeof sums[0]);
+    memcpy(y[0], y[1], sizeof y[0]);
+    for (int k = 0; k < PARTS * CLT_LEAF_SUMS; k++) {
+      assert_near(sums[1][k], wanted[k / CLT_LEAF_SUMS][k % CLT_LEAF_SUMS], 1e-13);
+    }
+    for (int s = 0; s < SIDE; s++) {
+      for (int k = 0; k <= s; k++) {
+        const int at = span[s].first + k;
+        const double u = place[SIDE - 1 - s + k], w = place[s], *g = f + 4 * (s % PARTS);
+        const double light = g[0] + u * g[1] + w * g[2] + u * w * g[3];
+        assert_near(y[1][at], (double)own[at] * x[at] + 0.6 * (double)flood[at] + (double)cells[at] * light, 1e-14);
+      }
+    }
+  }
+  assert_true(clt_leaf_choose()->runs_here());
+}
+
 static void test_byte_variants(void **unused) {
   (void)unused;
   enum { MOST = 1024, BLOCKS = MOST / CLT_BLOCK };
@@ -495,13 +551,19 @@ static void test_compensation(void **unused) {
 }
 
 int main(void) {
-  const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_entries),        cmocka_unit_test(test_products),
-      cmocka_unit_test(test_thread_count),   cmocka_unit_test(test_half_variants),
-      cmocka_unit_test(test_plain_variants), cmocka_unit_test(test_pass_variants),
-      cmocka_unit_test(test_byte_variants),  cmocka_unit_test(case_18_fp16_subnormal_and_overflow),
-      cmocka_unit_test(test_half_codes),     cmocka_unit_test(test_refusals),
-      cmocka_unit_test(test_from_tree),      cmocka_unit_test(case_19_sums_of_131072_terms),
-      cmocka_unit_test(test_compensation)};
+  const struct CMUnitTest tests[] = {cmocka_unit_test(test_entries),
+                                     cmocka_unit_test(test_products),
+                                     cmocka_unit_test(test_thread_count),
+                                     cmocka_unit_test(test_half_variants),
+                                     cmocka_unit_test(test_plain_variants),
+                                     cmocka_unit_test(test_pass_variants),
+                                     cmocka_unit_test(test_leaf_variants),
+                                     cmocka_unit_test(test_byte_variants),
+                                     cmocka_unit_test(case_18_fp16_subnormal_and_overflow),
+                                     cmocka_unit_test(test_half_codes),
+                                     cmocka_unit_test(test_refusals),
+                                     cmocka_unit_test(test_from_tree),
+                                     cmocka_unit_test(case_19_sums_of_131072_terms),
+                                     cmocka_unit_test(test_compensation)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,58 @@
+/* Sums and light over the leaves of a hierarchy. */
+#include <string.h>
+
+#include "transport/kernels.h"
+
+enum { LANES = 4 }; /* partial sums; a leaf is a few times as wide */
+
+typedef double pair __attribute__((vector_size(2 * sizeof(double))));
+static inline pair take_portable(const float *at) {
+  return (pair){(double)at[0], (double)at[1]};
+}
+
+#define WIDE 2
+#define NAME(of) of##_portable
+#define FOR
+#define TAKE take_portable
+#include "transport/leaf_loops.h"
+#undef WIDE
+#undef NAME
+#undef FOR
+#undef TAKE
+
+static bool runs_everywhere(void) {
+  return true;
+}
+
+static const clt_leaf_kernels portable = {.runs_here = runs_everywhere, .sum = sum_portable, .spread = spread_portable};
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+
+#define WIDE 4
+#define NAME(of) of##_avx2
+#define FOR __attribute__((target("avx2")))
+#define TAKE take_avx2
+FOR static inline __m256d take_avx2(const float *at) {
+  return _mm256_cvtps_pd(_mm_loadu_ps(at));
+}
+#include "transport/leaf_loops.h"
+
+static bool has_avx2(void) {
+  return __builtin_cpu_supports("avx2");
+}
+
+static const clt_leaf_kernels avx2 = {.needs = "AVX2", .runs_here = has_avx2, .sum = sum_avx2, .spread = spread_avx2};
+
+const clt_leaf_kernels *const clt_leaf_variants[] = {&avx2, &portable, NULL};
+#else
+const clt_leaf_kernels *const clt_leaf_variants[] = {&portable, NULL};
+#endif
+
+const clt_leaf_kernels *clt_leaf_choose(void) {
+  size_t k = 0;
+  while (!clt_leaf_variants[k]->runs_here()) {
+    k++;
+  }
+  return clt_leaf_variants[k];
+}
