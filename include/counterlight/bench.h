@@ -11,7 +11,7 @@
 extern "C" {
 #endif
 
-enum { CLT_BENCH_KERNELS = 8, CLT_BENCH_PEERS = 4, CLT_BENCH_POINTS = 8, CLT_BENCH_NAME_MAX = 40 };
+enum { CLT_BENCH_KERNELS = 9, CLT_BENCH_PEERS = 4, CLT_BENCH_POINTS = 8, CLT_BENCH_NAME_MAX = 40 };
 
 typedef struct clt_bench_kernel {
   char name[CLT_BENCH_NAME_MAX];

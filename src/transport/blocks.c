@@ -10,11 +10,10 @@
 enum { SLICES = CLT_SLICES, PIECE = 8192 };
 enum { WORTH_SHARING = 16384 }; /* values of the columns from which threads pay */
 
-/* scratch: twice SLICES x K partial sums, twice K sums, N values */
+/* scratch: twice SLICES x K partial sums, twice K sums */
 typedef struct workspace {
   double *partial, *of_blocks; /* SLICES x K: of the columns, and over the blocks */
   double *total, *even;        /* K: their sums */
-  double *cells;
 } workspace;
 
 /* The cells first <= j < end. */
@@ -23,19 +22,18 @@ typedef struct slice {
   double *partial, *of_blocks; /* K, its own */
 } slice;
 
-size_t clt_block_scratch(size_t cells, size_t count) {
-  return 2 * (SLICES + 1) * count + cells;
+size_t clt_block_scratch(size_t count) {
+  return 2 * (SLICES + 1) * count;
 }
 
 static workspace begin_turn(const clt_transport *transport, int channel) {
   clt_block_storage *own = transport->storage;
   pthread_mutex_lock(&own->turn[channel]);
-  double *scratch = own->scratch + (size_t)channel * clt_block_scratch(transport->cols, own->count);
+  double *scratch = own->scratch + (size_t)channel * clt_block_scratch(own->count);
   return (workspace){.partial = scratch,
                      .of_blocks = scratch + SLICES * own->count,
                      .total = scratch + 2 * SLICES * own->count,
-                     .even = scratch + (2 * SLICES + 1) * own->count,
-                     .cells = scratch + 2 * (SLICES + 1) * own->count};
+                     .even = scratch + (2 * SLICES + 1) * own->count};
 }
 
 static void end_turn(const clt_transport *transport, int channel) {
@@ -115,9 +113,9 @@ static void find_even(const clt_transport *transport, const workspace *room, con
   fold_means(own, room->of_blocks, room->even);
 }
 
-/* One piece of up to four columns: out += C gain and partial += C' in. */
-static void pass_piece(const clt_pass_kernels *kernels, const float *const column[CLT_PLAIN_ROWS], size_t columns,
-                       size_t count, const double *gain, const double *in, double *out, double *partial) {
+/* Up to four columns: out += C gain and partial += C' in. */
+static void pass_four(const clt_pass_kernels *kernels, const float *const column[CLT_PLAIN_ROWS], size_t columns,
+                      size_t count, const double *gain, const double *in, double *out, double *partial) {
   double sum[CLT_PLAIN_ROWS], factor[CLT_PLAIN_ROWS] = {0};
   memcpy(factor, gain, columns * sizeof *factor);
   kernels->pass(column, factor, in, count, sum, out);
@@ -126,35 +124,69 @@ static void pass_piece(const clt_pass_kernels *kernels, const float *const colum
   }
 }
 
-/* Of a slice: out += C gain and partial = C' in, reading the columns once. */
-static void pass_columns(const clt_transport *transport, int channel, const slice *of, const double *gain,
+/* Of a piece: out += C gain and partial += C' in, reading the columns once. in and out begin with the piece. */
+static void pass_columns(const clt_transport *transport, int channel, const slice *piece, const double *gain,
                          const double *in, double *out) {
   const size_t count = ((const clt_block_storage *)transport->storage)->count;
   const clt_pass_kernels *kernels = clt_pass_choose();
-  memset(of->partial, 0, count * sizeof *of->partial);
-  for (size_t first = of->first; first < of->end; first += PIECE) {
-    const size_t length = of->end - first < PIECE ? of->end - first : PIECE;
-    for (size_t b = 0; b < count; b += CLT_PLAIN_ROWS) {
-      const size_t columns = count - b < CLT_PLAIN_ROWS ? count - b : CLT_PLAIN_ROWS;
-      const float *column[CLT_PLAIN_ROWS];
-      for (size_t r = 0; r < CLT_PLAIN_ROWS; r++) { /* behind the last column, that column again */
-        column[r] = column_of(transport, channel, r < columns ? b + r : count - 1) + first;
-      }
-      pass_piece(kernels, column, columns, length, gain + b, in + first, out + first, of->partial + b);
+  for (size_t b = 0; b < count; b += CLT_PLAIN_ROWS) {
+    const size_t columns = count - b < CLT_PLAIN_ROWS ? count - b : CLT_PLAIN_ROWS;
+    const float *column[CLT_PLAIN_ROWS];
+    for (size_t r = 0; r < CLT_PLAIN_ROWS; r++) { /* behind the last column, that column again */
+      column[r] = column_of(transport, channel, r < columns ? b + r : count - 1) + piece->first;
     }
+    pass_four(kernels, column, columns, piece->end - piece->first, gain + b, in, out, piece->partial + b);
   }
 }
 
-/* Of a slice: y = own x, uneven = W (x - P even). */
-static void begin_slice(const clt_transport *transport, const float *near, const slice *of, const double *even,
-                        const double *x, double *y, double *uneven) {
-  const clt_block_storage *own = transport->storage;
-  for (size_t k = own->first_run[of->number]; k < own->first_run[of->number + 1]; k++) {
-    const double mean = even[own->run[k].block];
-    for (int32_t j = own->run[k].first; j < own->run[k + 1].first; j++) {
+/* The next piece of a slice behind `first`. */
+static slice piece_of(const slice *of, size_t first) {
+  slice piece = *of;
+  piece.first = first;
+  piece.end = of->end - first < PIECE ? of->end : first + PIECE;
+  return piece;
+}
+
+/* Of a piece: y = own x, and its uneven = W (x - P even). *run: that of its first cell, and then of the next piece's.
+ */
+static void begin_piece(const clt_block_storage *own, const float *near, const slice *piece, size_t *run,
+                        const double *even, const double *x, double *y, double *uneven) {
+  for (size_t first = piece->first; first < piece->end;) {
+    const double mean = even[own->run[*run].block];
+    const size_t next = (size_t)own->run[*run + 1].first, end = next < piece->end ? next : piece->end;
+    for (size_t j = first; j < end; j++) {
       y[j] = (double)near[j] * x[j];
-      uneven[j] = (double)own->flux[j] * (x[j] - mean);
+      uneven[j - piece->first] = (double)own->flux[j] * (x[j] - mean);
     }
+    *run += end == next;
+    first = end;
+  }
+}
+
+/* Of a slice: y = near x + C even, partial = C' W (x - P even). */
+static void apply_slice(const clt_transport *transport, int channel, const slice *of, const double *even,
+                        const double *x, double *y) {
+  const clt_block_storage *own = transport->storage;
+  double uneven[PIECE];
+  size_t run = own->first_run[of->number];
+  memset(of->partial, 0, own->count * sizeof *of->partial);
+  for (size_t first = of->first; first < of->end; first += PIECE) {
+    const slice piece = piece_of(of, first);
+    begin_piece(own, own_of(transport, channel), &piece, &run, even, x, y, uneven);
+    pass_columns(transport, channel, &piece, even, uneven, y + first);
+  }
+  clt_near_stream_add(&own->near, channel, of->number, x, y);
+}
+
+/* Of a slice: v = C even, partial = C' y. */
+static void apply_slice_transposed(const clt_transport *transport, int channel, const slice *of, const double *even,
+                                   const double *y, double *v) {
+  const clt_block_storage *own = transport->storage;
+  memset(of->partial, 0, own->count * sizeof *of->partial);
+  memset(v + of->first, 0, (of->end - of->first) * sizeof *v);
+  for (size_t first = of->first; first < of->end; first += PIECE) {
+    const slice piece = piece_of(of, first);
+    pass_columns(transport, channel, &piece, even, y + first, v + first);
   }
 }
 
@@ -168,14 +200,14 @@ static void add_total(const clt_block_storage *own, const slice *of, const doubl
   }
 }
 
-/* Of a slice: x = own y + W (P total + cells). */
-static void end_slice(const clt_transport *transport, const float *near, const slice *of, const workspace *room,
+/* Of a slice: x = own y + W (P total + x). */
+static void end_slice(const clt_transport *transport, const float *near, const slice *of, const double *total,
                       const double *y, double *x) {
   const clt_block_storage *own = transport->storage;
   for (size_t k = own->first_run[of->number]; k < own->first_run[of->number + 1]; k++) {
-    const double here = room->total[own->run[k].block];
+    const double here = total[own->run[k].block];
     for (int32_t j = own->run[k].first; j < own->run[k + 1].first; j++) {
-      x[j] = (double)near[j] * y[j] + (double)own->flux[j] * (here + room->cells[j]);
+      x[j] = (double)near[j] * y[j] + (double)own->flux[j] * (here + x[j]);
     }
   }
 }
@@ -183,7 +215,6 @@ static void end_slice(const clt_transport *transport, const float *near, const s
 /* e_b the mean of x over b by flux, u = W (x - P e), z = C' u:  y = near x + C e + P D^-1 z */
 static void blocks_apply(const clt_transport *transport, int channel, const double *x, double *y) {
   const clt_block_storage *own = transport->storage;
-  const float *near = own_of(transport, channel);
   workspace room = begin_turn(transport, channel);
 #pragma omp parallel if (is_worth_sharing(transport))
   {
@@ -191,9 +222,7 @@ static void blocks_apply(const clt_transport *transport, int channel, const doub
 #pragma omp for schedule(dynamic, 1)
     for (size_t k = 0; k < SLICES; k++) {
       const slice of = slice_of(transport, &room, k);
-      begin_slice(transport, near, &of, room.even, x, y, room.cells);
-      clt_near_stream_add(&own->near, channel, k, x, y);
-      pass_columns(transport, channel, &of, room.even, room.cells, y);
+      apply_slice(transport, channel, &of, room.even, x, y);
     }
 #pragma omp single
     fold_means(own, room.partial, room.total);
@@ -217,9 +246,8 @@ static void blocks_apply_transposed(const clt_transport *transport, int channel,
 #pragma omp for schedule(dynamic, 1)
     for (size_t k = 0; k < SLICES; k++) {
       const slice of = slice_of(transport, &room, k);
-      memset(room.cells + of.first, 0, (of.end - of.first) * sizeof *room.cells);
-      pass_columns(transport, channel, &of, room.even, y, room.cells);
-      sum_blocks(own, &of, room.cells, true, of.of_blocks);
+      apply_slice_transposed(transport, channel, &of, room.even, y, x);
+      sum_blocks(own, &of, x, true, of.of_blocks);
     }
 #pragma omp single
     {
@@ -232,7 +260,7 @@ static void blocks_apply_transposed(const clt_transport *transport, int channel,
 #pragma omp for schedule(dynamic, 1)
     for (size_t k = 0; k < SLICES; k++) {
       const slice of = slice_of(transport, &room, k);
-      end_slice(transport, near, &of, &room, y, x);
+      end_slice(transport, near, &of, room.total, y, x);
     }
     clt_near_stream_add_transposed(&own->near, channel, y, x);
   }
@@ -245,12 +273,12 @@ static void blocks_diagonal(const clt_transport *transport, int channel, double 
   const float *value = near_of(transport, channel);
   workspace room = begin_turn(transport, channel);
   for (size_t i = 0; i < transport->cols; i++) {
-    room.cells[i] = (double)column_of(transport, channel, (size_t)own->block[i])[i];
+    diagonal[i] = (double)column_of(transport, channel, (size_t)own->block[i])[i];
   }
-  find_even(transport, &room, room.cells, true);
+  find_even(transport, &room, diagonal, true);
   for (size_t i = 0; i < transport->rows; i++) {
     const int32_t a = own->block[i];
-    double entry = (double)own->flux[i] * own->inverse[a] * (2 * room.cells[i] - room.even[a]);
+    double entry = (double)own->flux[i] * own->inverse[a] * (2 * diagonal[i] - room.even[a]);
     for (int64_t e = own->start[i]; e < own->start[i + 1]; e++) {
       entry += own->cell[e] == (int32_t)i ? (double)value[e] : 0;
     }

@@ -39,7 +39,7 @@ typedef struct clt_block_storage {
 } clt_block_storage;
 
 /* Doubles of scratch that a channel needs. */
-size_t clt_block_scratch(size_t cells, size_t count);
+size_t clt_block_scratch(size_t count);
 
 /* The kind's part in blocks_file.c. */
 clt_status clt_blocks_check(const clt_transport *transport, const char *source, clt_error *error);

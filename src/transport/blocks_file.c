@@ -104,7 +104,7 @@ static clt_status finish(clt_transport *transport, size_t entries, const char *s
     return status;
   }
   own->inverse = clt_alloc(own->count, sizeof *own->inverse);
-  own->scratch = clt_alloc(clt_block_scratch(cells, own->count), channels * sizeof *own->scratch);
+  own->scratch = clt_alloc(clt_block_scratch(own->count), channels * sizeof *own->scratch);
   if (own->inverse == NULL || own->scratch == NULL) {
     return clt_fail(error, CLT_FAILED, "%s: no memory for products with %zu blocks", source, own->count);
   }

@@ -9,7 +9,7 @@
 #include "solve/live.h"
 #include "tradeoff/bench/bench.h"
 
-enum { REPEATS = 9, KERNELS = 3, READ_BYTES = 1 << 27 };
+enum { REPEATS = 9, KERNELS = 4, READ_BYTES = 1 << 27 };
 
 typedef struct trial {
   uint64_t *words; /* READ_BYTES of them, more than caches hold */
@@ -58,6 +58,9 @@ static uint64_t run_turn(trial *own, const clt_transport *transport, const clt_t
     since_ns = clt_clock_ns();
     clt_transport_apply_all(hierarchy, own->x, own->y);
     own->times[2][turn] = clt_clock_since(since_ns);
+    since_ns = clt_clock_ns();
+    transposed_all(hierarchy, own->y, own->x);
+    own->times[3][turn] = clt_clock_since(since_ns);
   }
   return sum;
 }
@@ -68,6 +71,11 @@ static void tell(clt_bench_report *report, const char *what, const char *storage
   kernel->bytes = bytes;
   kernel->ms = 1e3 * seconds;
   kernel->fraction = 1e-9 * bytes / seconds / report->bandwidth_gbs;
+}
+
+/* What a product reads and writes: T, and a vector on either side. */
+static double bytes_of(const clt_transport_info *info) {
+  return (double)info->bytes + (double)info->channels * (double)(info->rows + info->cols) * sizeof(double);
 }
 
 static clt_status measure(trial *own, const clt_transport *transport, clt_bench_report *report, clt_error *error) {
@@ -84,12 +92,13 @@ static clt_status measure(trial *own, const clt_transport *transport, clt_bench_
   }
   if (status == CLT_OK && sum == 0) {
     report->bandwidth_gbs = 1e-9 * READ_BYTES / clt_bench_median(own->times[KERNELS], REPEATS);
-    tell(report, "T x", info.storage, (double)info.bytes, clt_bench_median(own->times[0], REPEATS));
-    tell(report, "T' y", info.storage, (double)info.bytes, clt_bench_median(own->times[1], REPEATS));
+    tell(report, "T x", info.storage, bytes_of(&info), clt_bench_median(own->times[0], REPEATS));
+    tell(report, "T' y", info.storage, bytes_of(&info), clt_bench_median(own->times[1], REPEATS));
   }
   if (status == CLT_OK && hierarchy != NULL) {
     const clt_transport_info made = clt_transport_describe(hierarchy);
-    tell(report, "T x", made.storage, (double)made.bytes, clt_bench_median(own->times[2], REPEATS));
+    tell(report, "T x", made.storage, bytes_of(&made), clt_bench_median(own->times[2], REPEATS));
+    tell(report, "T' y", made.storage, bytes_of(&made), clt_bench_median(own->times[3], REPEATS));
   }
   clt_transport_destroy(hierarchy);
   return status;
