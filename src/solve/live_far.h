@@ -26,6 +26,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "base/turns.h"
 #include "solve/live.h"
 #include "transport/hierarchy.h"
 
@@ -137,5 +138,18 @@ void clt_newton_gather(clt_far *far);
 void clt_newton_light(const clt_far *far, clt_live_item *item);
 /* drift[channel] = by how much ||D s||^2 may change where q becomes U'r, from r as it was looked at. */
 void clt_newton_drift(clt_far *far, double drift[CLT_CHANNELS_MAX]);
+
+/* A pass: the items in their turns, few at once. */
+enum { CLT_LIVE_AT_ONCE = 8 };
+static inline clt_turns clt_live_turns(const clt_far *far) {
+  return clt_turns_of_few(far->items, CLT_LIVE_AT_ONCE);
+}
+static inline bool clt_live_next(const clt_far *far, clt_turns *turns, clt_live_item **first, clt_live_item **end) {
+  size_t from = 0, to = 0;
+  const bool more = clt_turns_next_few(turns, far->items, CLT_LIVE_AT_ONCE, &from, &to);
+  *first = far->item + from;
+  *end = far->item + to;
+  return more;
+}
 
 #endif

@@ -8,7 +8,7 @@
 #include "base/memory.h"
 #include "solve/live_factor.h"
 
-enum { STEPS_MAX = 40, STALE_STEPS = 5, ITEMS_AT_ONCE = 8, WORTH_SHARING = 16384 /* values */ };
+enum { STEPS_MAX = 40, STALE_STEPS = 5, WORTH_SHARING = 16384 /* values */ };
 static const double WORSE = 1.001; /* of the least objective: above it a step has gone too far */
 static const double MOVED = 0.01; /* of the lit cells: held otherwise than in the factor, from which it is taken anew */
 static const double SLOW = 0.3;   /* of the gap before: what a step leaves with a factor that has aged */
@@ -137,9 +137,12 @@ static void add_up(clt_far *far, frame *at) {
 
 /* The residual and gap of the drive that is known, for the target. */
 static void aim(clt_far *far, frame *at) {
-#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE) if (far->shared)
-  for (size_t k = 0; k < far->items; k++) {
-    far->kernels->aim(far, &far->item[k]);
+  clt_turns turns = clt_live_turns(far);
+#pragma omp parallel if (far->shared)
+  for (clt_live_item *item, *end; clt_live_next(far, &turns, &item, &end);) {
+    for (; item < end; item++) {
+      far->kernels->aim(far, item);
+    }
   }
   add_up(far, at);
 }
@@ -147,13 +150,15 @@ static void aim(clt_far *far, frame *at) {
 /* The same of the drive that was changed. */
 static void look(clt_far *far, frame *at, clt_live_result *result) {
   const int64_t since_ns = clt_clock_ns();
+  clt_turns turns = clt_live_turns(far);
 #pragma omp parallel if (far->shared)
   {
     clt_newton_gather(far);
-#pragma omp for schedule(dynamic, ITEMS_AT_ONCE)
-    for (size_t k = 0; k < far->items; k++) {
-      clt_newton_light(far, &far->item[k]);
-      far->kernels->look(far, &far->item[k]);
+    for (clt_live_item *item, *end; clt_live_next(far, &turns, &item, &end);) {
+      for (; item < end; item++) {
+        clt_newton_light(far, item);
+        far->kernels->look(far, item);
+      }
     }
   }
   add_up(far, at);
@@ -229,9 +234,12 @@ static void give(const clt_far *far, clt_live_item *item) {
 
 /* After the drive was changed otherwise than by a step. */
 static void give_again(clt_far *far) {
-#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE) if (far->shared)
-  for (size_t k = 0; k < far->items; k++) {
-    give(far, &far->item[k]);
+  clt_turns turns = clt_live_turns(far);
+#pragma omp parallel if (far->shared)
+  for (clt_live_item *item, *end; clt_live_next(far, &turns, &item, &end);) {
+    for (; item < end; item++) {
+      give(far, item);
+    }
   }
 }
 
@@ -251,13 +259,15 @@ static bool step(clt_far *far, bool renew) {
   if (!keep_factors(far, renew)) {
     return false;
   }
+  clt_turns turns = clt_live_turns(far);
 #pragma omp parallel if (far->shared)
   {
     clt_newton_step(far);
-#pragma omp for schedule(dynamic, ITEMS_AT_ONCE)
-    for (size_t k = 0; k < far->items; k++) {
-      clt_newton_turn(far, &far->item[k]);
-      far->kernels->move(far, &far->item[k], far->drive[next]);
+    for (clt_live_item *item, *end; clt_live_next(far, &turns, &item, &end);) {
+      for (; item < end; item++) {
+        clt_newton_turn(far, item);
+        far->kernels->move(far, item, far->drive[next]);
+      }
     }
   }
   far->now = next;

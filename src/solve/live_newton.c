@@ -71,7 +71,7 @@ static float *partial_of(const clt_far *far, int channel, size_t chunk) {
 
 /* partial = factor' of what the items hold at `offset`, of every channel and chunk: factor is left or right, whole. */
 static void sum_items(const clt_far *far, const float *factor, size_t offset) {
-#pragma omp for schedule(dynamic, 1)
+#pragma omp for schedule(static)
   for (int k = 0; k < far->channels * CHUNKS; k++) {
     const size_t chunk = (size_t)(k % CHUNKS);
     sum_chunk(far, k / CHUNKS, chunk, factor_of(far, factor, k / CHUNKS), far->rank, offset,
@@ -117,7 +117,7 @@ static void solve_channel(clt_far *far, int channel) {
 }
 
 void clt_newton_step(clt_far *far) {
-#pragma omp for schedule(dynamic, 1)
+#pragma omp for schedule(static)
   for (int k = 0; k < far->channels * CHUNKS; k++) {
     const int channel = k / CHUNKS;
     const size_t chunk = (size_t)(k % CHUNKS);

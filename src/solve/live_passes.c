@@ -2,21 +2,21 @@
 #include "base/clock.h"
 #include "solve/live_far.h"
 
-enum { ITEMS_AT_ONCE = 8 };
-
 static double time_kernel(clt_far *far, clt_live_pass_name name, float *next) {
   const int64_t since_ns = clt_clock_ns();
-#pragma omp parallel for schedule(dynamic, ITEMS_AT_ONCE) if (far->shared)
-  for (size_t k = 0; k < far->items; k++) {
-    clt_live_item *item = &far->item[k];
-    if (name == CLT_LIVE_PASS_AIM) {
-      far->kernels->aim(far, item);
-    } else if (name == CLT_LIVE_PASS_MOVE) {
-      far->kernels->move(far, item, next);
-    } else if (name == CLT_LIVE_PASS_LIGHT) {
-      clt_newton_light(far, item);
-    } else {
-      far->kernels->look(far, item);
+  clt_turns turns = clt_live_turns(far);
+#pragma omp parallel if (far->shared)
+  for (clt_live_item *item, *end; clt_live_next(far, &turns, &item, &end);) {
+    for (; item < end; item++) {
+      if (name == CLT_LIVE_PASS_AIM) {
+        far->kernels->aim(far, item);
+      } else if (name == CLT_LIVE_PASS_MOVE) {
+        far->kernels->move(far, item, next);
+      } else if (name == CLT_LIVE_PASS_LIGHT) {
+        clt_newton_light(far, item);
+      } else {
+        far->kernels->look(far, item);
+      }
     }
   }
   return clt_clock_since(since_ns);

@@ -4,6 +4,7 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "base/turns.h"
 #include "transport/kernels.h"
 
 /* A product walks down slices of cells in pieces that stay in the cache while the columns pass. */
@@ -101,14 +102,28 @@ static void sum_blocks(const clt_block_storage *own, const slice *of, const doub
   }
 }
 
+/* The loops of a product. */
+typedef struct loops {
+  clt_turns even, columns, end, near[2];
+} loops;
+
+static loops begin_loops(void) {
+  const clt_turns slices = clt_turns_of(SLICES);
+  loops all = {.even = slices, .columns = slices, .end = slices};
+  clt_near_stream_turns(all.near);
+  return all;
+}
+
 /* room->even = the means over the blocks, by every thread of a team. */
-static void find_even(const clt_transport *transport, const workspace *room, const double *values, bool weighted) {
+static void find_even(const clt_transport *transport, const workspace *room, clt_turns *turns, const double *values,
+                      bool weighted) {
   const clt_block_storage *own = transport->storage;
-#pragma omp for schedule(dynamic, 1)
-  for (size_t k = 0; k < SLICES; k++) {
-    const slice of = slice_of(transport, room, k);
+  size_t turn = 0;
+  while (clt_turns_next(turns, &turn)) {
+    const slice of = slice_of(transport, room, turn);
     sum_blocks(own, &of, values, weighted, of.of_blocks);
   }
+#pragma omp barrier
 #pragma omp single
   fold_means(own, room->of_blocks, room->even);
 }
@@ -201,9 +216,8 @@ static void add_total(const clt_block_storage *own, const slice *of, const doubl
 }
 
 /* Of a slice: x = own y + W (P total + x). */
-static void end_slice(const clt_transport *transport, const float *near, const slice *of, const double *total,
+static void end_slice(const clt_block_storage *own, const float *near, const slice *of, const double *total,
                       const double *y, double *x) {
-  const clt_block_storage *own = transport->storage;
   for (size_t k = own->first_run[of->number]; k < own->first_run[of->number + 1]; k++) {
     const double here = total[own->run[k].block];
     for (int32_t j = own->run[k].first; j < own->run[k + 1].first; j++) {
@@ -216,19 +230,20 @@ static void end_slice(const clt_transport *transport, const float *near, const s
 static void blocks_apply(const clt_transport *transport, int channel, const double *x, double *y) {
   const clt_block_storage *own = transport->storage;
   workspace room = begin_turn(transport, channel);
+  loops all = begin_loops();
 #pragma omp parallel if (is_worth_sharing(transport))
   {
-    find_even(transport, &room, x, true);
-#pragma omp for schedule(dynamic, 1)
-    for (size_t k = 0; k < SLICES; k++) {
-      const slice of = slice_of(transport, &room, k);
+    size_t turn = 0;
+    find_even(transport, &room, &all.even, x, true);
+    while (clt_turns_next(&all.columns, &turn)) {
+      const slice of = slice_of(transport, &room, turn);
       apply_slice(transport, channel, &of, room.even, x, y);
     }
+#pragma omp barrier
 #pragma omp single
     fold_means(own, room.partial, room.total);
-#pragma omp for schedule(dynamic, 1)
-    for (size_t k = 0; k < SLICES; k++) {
-      const slice of = slice_of(transport, &room, k);
+    while (clt_turns_next(&all.end, &turn)) {
+      const slice of = slice_of(transport, &room, turn);
       add_total(own, &of, room.total, y);
     }
   }
@@ -238,17 +253,18 @@ static void blocks_apply(const clt_transport *transport, int channel, const doub
 /* q = D^-1 P' y, p = C' y, v = C q, v_b the mean of v over b by flux:  x = near' y + W (P D^-1 p + v - P v_b) */
 static void blocks_apply_transposed(const clt_transport *transport, int channel, const double *y, double *x) {
   const clt_block_storage *own = transport->storage;
-  const float *near = own_of(transport, channel);
   workspace room = begin_turn(transport, channel);
+  loops all = begin_loops();
 #pragma omp parallel if (is_worth_sharing(transport))
   {
-    find_even(transport, &room, y, false);
-#pragma omp for schedule(dynamic, 1)
-    for (size_t k = 0; k < SLICES; k++) {
-      const slice of = slice_of(transport, &room, k);
+    size_t turn = 0;
+    find_even(transport, &room, &all.even, y, false);
+    while (clt_turns_next(&all.columns, &turn)) {
+      const slice of = slice_of(transport, &room, turn);
       apply_slice_transposed(transport, channel, &of, room.even, y, x);
       sum_blocks(own, &of, x, true, of.of_blocks);
     }
+#pragma omp barrier
 #pragma omp single
     {
       fold_means(own, room.partial, room.total);
@@ -257,12 +273,12 @@ static void blocks_apply_transposed(const clt_transport *transport, int channel,
         room.total[b] -= room.even[b];
       }
     }
-#pragma omp for schedule(dynamic, 1)
-    for (size_t k = 0; k < SLICES; k++) {
-      const slice of = slice_of(transport, &room, k);
-      end_slice(transport, near, &of, room.total, y, x);
+    while (clt_turns_next(&all.end, &turn)) {
+      const slice of = slice_of(transport, &room, turn);
+      end_slice(own, own_of(transport, channel), &of, room.total, y, x);
     }
-    clt_near_stream_add_transposed(&own->near, channel, y, x);
+#pragma omp barrier
+    clt_near_stream_add_transposed(&own->near, channel, all.near, y, x);
   }
   end_turn(transport, channel);
 }
@@ -275,7 +291,8 @@ static void blocks_diagonal(const clt_transport *transport, int channel, double 
   for (size_t i = 0; i < transport->cols; i++) {
     diagonal[i] = (double)column_of(transport, channel, (size_t)own->block[i])[i];
   }
-  find_even(transport, &room, diagonal, true);
+  loops all = begin_loops();
+  find_even(transport, &room, &all.even, diagonal, true);
   for (size_t i = 0; i < transport->rows; i++) {
     const int32_t a = own->block[i];
     double entry = (double)own->flux[i] * own->inverse[a] * (2 * diagonal[i] - room.even[a]);

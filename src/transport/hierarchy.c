@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "base/turns.h"
 #include "transport/kernels.h"
 
 enum { WORTH_SHARING = 16384 }; /* cells from which threads pay */
@@ -158,24 +159,37 @@ static void light_chunk(const product *of, size_t chunk) {
   }
 }
 
+/* The loops of a product. */
+typedef struct loops {
+  clt_turns sum, gather, light, spread, near[2];
+} loops;
+
+static loops begin_loops(void) {
+  const clt_turns slices = clt_turns_of(CLT_SLICES), chunks = clt_turns_of(CLT_HIERARCHY_CHUNKS);
+  loops all = {.sum = slices, .gather = chunks, .light = chunks, .spread = slices};
+  clt_near_stream_turns(all.near);
+  return all;
+}
+
 /* z and what the leaves give out, by every thread of a team. */
-static void light_leaves(const product *of) {
-#pragma omp for schedule(dynamic, 1)
-  for (size_t slice = 0; slice < CLT_SLICES; slice++) {
-    sum_slice(of, slice);
+static void light_leaves(const product *of, loops *all) {
+  size_t turn = 0;
+  while (clt_turns_next(&all->sum, &turn)) {
+    sum_slice(of, turn);
   }
+#pragma omp barrier
 #pragma omp single
   fold_parts(of);
-#pragma omp for schedule(dynamic, 1)
-  for (size_t chunk = 0; chunk < CLT_HIERARCHY_CHUNKS; chunk++) {
-    gather_chunk(of, chunk);
+  while (clt_turns_next(&all->gather, &turn)) {
+    gather_chunk(of, turn);
   }
+#pragma omp barrier
 #pragma omp single
   fold_chunks(of);
-#pragma omp for schedule(dynamic, 1)
-  for (size_t chunk = 0; chunk < CLT_HIERARCHY_CHUNKS; chunk++) {
-    light_chunk(of, chunk);
+  while (clt_turns_next(&all->light, &turn)) {
+    light_chunk(of, turn);
   }
+#pragma omp barrier
 }
 
 /* out over the cells of a slice. */
@@ -205,13 +219,14 @@ static void hierarchy_apply(const clt_transport *transport, int channel, const d
   product of = begin_turn(transport, channel, false);
   of.in = x;
   of.out = y;
+  loops all = begin_loops();
 #pragma omp parallel if (transport->cols >= WORTH_SHARING)
   {
-    light_leaves(&of);
-#pragma omp for schedule(dynamic, 1)
-    for (size_t slice = 0; slice < CLT_SLICES; slice++) {
-      spread_slice(&of, slice);
-      clt_near_stream_add(&own->near, channel, slice, x, y);
+    size_t turn = 0;
+    light_leaves(&of, &all);
+    while (clt_turns_next(&all.spread, &turn)) {
+      spread_slice(&of, turn);
+      clt_near_stream_add(&own->near, channel, turn, x, y);
     }
   }
   end_turn(&of);
@@ -222,14 +237,16 @@ static void hierarchy_apply_transposed(const clt_transport *transport, int chann
   product of = begin_turn(transport, channel, true);
   of.in = y;
   of.out = x;
+  loops all = begin_loops();
 #pragma omp parallel if (transport->cols >= WORTH_SHARING)
   {
-    light_leaves(&of);
-#pragma omp for schedule(dynamic, 1)
-    for (size_t slice = 0; slice < CLT_SLICES; slice++) {
-      spread_slice(&of, slice);
+    size_t turn = 0;
+    light_leaves(&of, &all);
+    while (clt_turns_next(&all.spread, &turn)) {
+      spread_slice(&of, turn);
     }
-    clt_near_stream_add_transposed(&own->near, channel, y, x);
+#pragma omp barrier
+    clt_near_stream_add_transposed(&own->near, channel, all.near, y, x);
   }
   end_turn(&of);
 }
@@ -279,13 +296,15 @@ static void hierarchy_row_sums(const clt_transport *transport, int channel, doub
   of.in = EVEN_DRIVE;
   of.in_step = 0;
   of.out = sums;
+  loops all = begin_loops();
 #pragma omp parallel if (transport->cols >= WORTH_SHARING)
   {
-    light_leaves(&of);
-#pragma omp for schedule(dynamic, 1)
-    for (size_t slice = 0; slice < CLT_SLICES; slice++) {
-      spread_slice(&of, slice);
+    size_t turn = 0;
+    light_leaves(&of, &all);
+    while (clt_turns_next(&all.spread, &turn)) {
+      spread_slice(&of, turn);
     }
+#pragma omp barrier
 #pragma omp for schedule(static)
     for (size_t i = 0; i < transport->cols; i++) {
       for (int64_t e = own->start[i]; e < own->start[i + 1]; e++) {

@@ -119,13 +119,19 @@ static void add_slice_transposed(const clt_near_stream *near, int channel, size_
   }
 }
 
-void clt_near_stream_add_transposed(const clt_near_stream *near, int channel, const double *y, double *x) {
+void clt_near_stream_turns(clt_turns turns[2]) {
+  turns[0] = turns[1] = clt_turns_of(CLT_SLICES / 2);
+}
+
+void clt_near_stream_add_transposed(const clt_near_stream *near, int channel, clt_turns turns[2], const double *y,
+                                    double *x) {
+  size_t turn = 0;
   if (near->apart) {
     for (size_t odd = 0; odd < 2; odd++) {
-#pragma omp for schedule(dynamic, 1)
-      for (size_t slice = odd; slice < CLT_SLICES; slice += 2) {
-        add_slice_transposed(near, channel, slice, y, x);
+      while (clt_turns_next(&turns[odd], &turn)) {
+        add_slice_transposed(near, channel, 2 * turn + odd, y, x);
       }
+#pragma omp barrier
     }
   } else {
 #pragma omp single

@@ -10,6 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/turns.h"
 #include "counterlight/status.h"
 
 enum { CLT_SLICES = 16 }; /* of the cells; fixed, so that sums do not depend on the number of threads */
@@ -37,7 +38,9 @@ size_t clt_near_stream_bytes(const clt_near_stream *near);
 
 /* y += near x, of the rows of a slice. */
 void clt_near_stream_add(const clt_near_stream *near, int channel, size_t slice, const double *x, double *y);
-/* x += near' y; called by every thread of a team, which meets before it returns. */
-void clt_near_stream_add_transposed(const clt_near_stream *near, int channel, const double *y, double *x);
+/* x += near' y, by every thread of a team, in two loops; the team meets before it returns. */
+void clt_near_stream_turns(clt_turns turns[2]);
+void clt_near_stream_add_transposed(const clt_near_stream *near, int channel, clt_turns turns[2], const double *y,
+                                    double *x);
 
 #endif
