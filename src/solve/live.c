@@ -7,6 +7,9 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
+#include "base/turns.h"
+
+enum { WORTH_SHARING = 16384 /* values */ };
 
 static clt_status check_options(const clt_live_options *options, const clt_transport_info *info, clt_error *error) {
   if (options != NULL && !(options->target_error >= 0 && options->target_error < 1)) {
@@ -122,12 +125,22 @@ static double sum_squares(const float *values, const unsigned char *lit, size_t 
   return sum;
 }
 
-/* ||target|| over lit cells of every channel, or ||white|| of a target that is black. */
+/* ||target|| over lit cells of every channel, or ||white|| of a target that is black. Its sums do not depend on the
+ * number of threads. */
 static clt_status measure_target(clt_live *live, const float *target, clt_error *error) {
-  double sum = 0;
-  for (int c = 0; c < live->info.channels; c++) {
-    sum +=
-        sum_squares(target + (size_t)c * live->info.cols, clt_certificate_lit(live->certificate, c), live->info.cols);
+  enum { SLICES = 16 };
+  const size_t cells = live->info.cols, slices = SLICES * (size_t)live->info.channels;
+  double part[SLICES * CLT_CHANNELS_MAX], sum = 0;
+  clt_turns turns = clt_turns_of(slices);
+#pragma omp parallel if (slices * cells >= WORTH_SHARING * SLICES)
+  for (size_t turn = 0; clt_turns_next(&turns, &turn);) {
+    const size_t channel = turn / SLICES, first = cells * (turn % SLICES) / SLICES;
+    const size_t end = cells * (turn % SLICES + 1) / SLICES;
+    part[turn] = sum_squares(target + channel * cells + first,
+                             clt_certificate_lit(live->certificate, (int)channel) + first, end - first);
+  }
+  for (size_t k = 0; k < slices; k++) {
+    sum += part[k];
   }
   if (!isfinite(sum)) {
     return clt_fail(error, CLT_BAD_INPUT, "a target of moving pictures has values that are not finite");

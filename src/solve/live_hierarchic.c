@@ -326,6 +326,17 @@ static void return_to_best(clt_far *far, frame *at, clt_live_result *result) {
   look(far, at, result);
 }
 
+/* The drive that is kept, to the caller. */
+static void hand_over(const clt_live *live, const clt_far *far, float *drive) {
+  enum { AT_ONCE = 4096 };
+  const float *kept = far->drive[far->now];
+  clt_turns turns = clt_turns_of_few(values_of(live), AT_ONCE);
+#pragma omp parallel if (far->shared)
+  for (size_t first, end; clt_turns_next_few(&turns, values_of(live), AT_ONCE, &first, &end);) {
+    memcpy(drive + first, kept + first, (end - first) * sizeof *drive);
+  }
+}
+
 static clt_status solve_frame(clt_live *live, const float *target, float *drive, clt_live_result *result,
                               clt_error *error) {
   (void)error;
@@ -338,7 +349,7 @@ static clt_status solve_frame(clt_live *live, const float *target, float *drive,
   if (!result->converged && far->now != far->best) {
     return_to_best(far, &at, result);
   }
-  memcpy(drive, far->drive[far->now], values_of(live) * sizeof *drive);
+  hand_over(live, far, drive);
   size_t lit = 0;
   for (int c = 0; c < live->info.channels; c++) {
     lit += far->lit[c];

@@ -230,11 +230,30 @@ INLINE void clear(clt_live_item *item) {
   item->residual = item->gap = 0;
 }
 
+/* Asks memory for the rows of a plane of every channel, or of one for all, over the item behind this one: they lie too
+ * far apart to be foreseen. Into the second cache, for in the first they would push each other out. */
+INLINE void foresee(const clt_far *far, const clt_live_item *item, const float *plane) {
+  enum { LINE = 16, SECOND = 2 };
+  const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
+  const float *row = plane + (size_t)leaf.y * (size_t)far->width + (size_t)leaf.x;
+  for (int32_t k = 0; k < leaf.height; k++, row += far->width) {
+    for (int32_t across = 0; across < leaf.width; across += LINE) {
+      __builtin_prefetch(row + across, 0, SECOND);
+    }
+  }
+}
+
 INLINE void pass(const clt_far *far, clt_live_item *item, bool aims) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
   const float *spill = far->spill != NULL ? far->spill + item->block * LANES : NULL;
+  const clt_live_item *next = &item[item + 1 < far->item + far->items];
   double size = 0;
   clear(item);
+  foresee(far, next, far->drive[far->now] + (size_t)next->channel * far->cells);
+  if (aims) {
+    foresee(far, next, far->target + (size_t)next->channel * far->cells);
+    foresee(far, next, far->black[next->channel]);
+  }
   for (int32_t across = 0; across < leaf.width; across += LANES) {
     look_sums sums = {0};
     strip s;
@@ -281,8 +300,11 @@ INLINE void move_row(const clt_far *far, const clt_live_item *item, const strip 
 
 INLINE void move(const clt_far *far, clt_live_item *item, float *next) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
+  const clt_live_item *behind = &item[item + 1 < far->item + far->items];
   memset(item->given, 0, sizeof item->given);
   item->light = 0;
+  foresee(far, behind, far->drive[far->now] + (size_t)behind->channel * far->cells);
+  foresee(far, behind, next + (size_t)behind->channel * far->cells);
   for (int32_t across = 0; across < leaf.width; across += LANES) {
     columns given = {0};
     lanes light = {0};
