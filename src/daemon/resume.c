@@ -1,9 +1,9 @@
 #include "daemon/resume.h"
 
-#include <inttypes.h>
 #include <stdio.h>
-#include <sys/stat.h>
 #include <unistd.h>
+
+#include "base/file.h"
 
 static void drop(const measure_job *job) {
   if (job->journal[0] != '\0') {
@@ -29,10 +29,10 @@ void resume_describe(const measure_job *job, const clt_station *station, char *t
   const char *const files[] = {job->settings, job->config.scene, job->config.calibration, job->calibration};
   int used = snprintf(text, size, "%s; calibrated %d", job->config.scheme, station->calibration != NULL);
   for (size_t k = 0; k < sizeof files / sizeof files[0]; k++) {
-    struct stat file = {0};
-    if (files[k][0] != '\0' && used >= 0 && (size_t)used < size && stat(files[k], &file) == 0) {
-      used += snprintf(text + used, size - (size_t)used, "; %zu: %" PRIdMAX ".%09ld, %" PRIdMAX, k,
-                       (intmax_t)file.st_mtim.tv_sec, file.st_mtim.tv_nsec, (intmax_t)file.st_size);
+    char stamp[CLT_STAMP_MAX];
+    clt_file_stamp(files[k], stamp);
+    if (stamp[0] != '\0' && used >= 0 && (size_t)used < size) {
+      used += snprintf(text + used, size - (size_t)used, "; %zu: %s", k, stamp);
     }
   }
 }

@@ -15,6 +15,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/file.h"
 #include "counterlight/image.h"
 #include "counterlight/transport.h"
 
@@ -24,12 +25,19 @@ typedef struct store {
   bool writable;
 } store;
 
+/* A file as it was when it was read. */
+typedef struct store_source {
+  char path[CLT_PATH_MAX];
+  char stamp[CLT_STAMP_MAX]; /* clt_file_stamp; empty: not known */
+} store_source;
+
 /* What state.json says. */
 typedef struct store_record {
   char configured[CLT_PATH_MAX]; /* the configuration's content when `show` was asked; empty: no `show` */
   char content[64];              /* file in the folder that is shown instead; empty: the configured one */
   char name[CLT_PATH_MAX];       /* what people call that */
-  uint64_t drive_of;             /* content that the stored drive is for (content_identity); 0: none */
+  uint64_t drive_of;             /* content that the stored drive is for (content.identity); 0: none */
+  store_source drive_from;       /* what that was read from */
 } store_record;
 
 /* Makes the folder, takes its lock and removes what an earlier daemon left half-written. CLT_FAILED where another
