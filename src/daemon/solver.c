@@ -8,6 +8,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/places.h"
+#include "daemon/resume.h"
 #include "tradeoff/json.h"
 
 /* That a measurement of what accuracy costs may take, roughly. */
@@ -174,8 +175,10 @@ static clt_status adopt_measured(solver *self, solver_job *job, solver_result *r
 
 /* One that cannot serve would not by being taken from the journal either. */
 static clt_status adopt(solver *self, solver_job *job, solver_result *result) {
+  char journal[CLT_PATH_MAX];
   clt_status status = adopt_measured(self, job, result);
-  store_drop_journal(self->state);
+  store_journal_path(self->state->folder, journal);
+  resume_drop(journal);
   return status;
 }
 

@@ -196,14 +196,6 @@ void store_journal_path(const char *folder, char path[CLT_PATH_MAX]) {
   }
 }
 
-void store_drop_journal(const store *state) {
-  char path[CLT_PATH_MAX];
-  store_journal_path(state->folder, path);
-  if (unlink(path) != 0 && errno != ENOENT && state->writable) {
-    clt_log(CLT_LOG_WARNING, "%s cannot be removed: %s", path, strerror(errno));
-  }
-}
-
 clt_status store_save_drive(const store *state, const clt_image *drive, clt_error *error) {
   char path[CLT_PATH_MAX];
   clt_status status =

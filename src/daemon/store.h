@@ -4,7 +4,8 @@
  *   transport.h5   the transport in use, replaced only by a complete newer one
  *   content.EXT    the picture that `show` brought, as it came
  *   drive.npy      the last drive
- *   acquisition.journal  what an acquisition under way has measured
+ *   acquisition.journal  what an acquisition under way has measured, with .starts behind it how many starts went on
+ *                        with that (resume.c)
  *   state.json     which content, and of what content the drive is
  *   snapshot/      the pictures of the last snapshot
  *
@@ -61,9 +62,6 @@ bool store_is_foreign(const clt_transport *transport, int width, int height, int
  * transport.h5.old. */
 clt_transport *store_load_transport(const store *state, int width, int height, int channels, const char *source);
 clt_status store_save_transport(const store *state, const clt_transport *transport, clt_error *error);
-
-/* What a finished acquisition was resumed by goes; the next one is of its own. */
-void store_drop_journal(const store *state);
 
 clt_status store_save_drive(const store *state, const clt_image *drive, clt_error *error);
 /* False where there is none that can be read. */

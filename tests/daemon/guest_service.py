@@ -226,6 +226,7 @@ def killed_while_it_measures_it_comes_back():
             met.append([client.ask("status")["state"] for _ in range(dice.randrange(1, 5))][-1])
         os.kill(before, signal.SIGKILL)
         wait_for("another process", lambda: another(before))
+        wait_for("what it was at to be ended", lambda: not (STATE / "acquisition.journal").exists())
         wait_showing()
         assert numpy.linalg.norm(stored_transport() - first) < NOISE * numpy.linalg.norm(first)
     print("killed while", collections.Counter(met))
