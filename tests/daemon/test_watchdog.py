@@ -8,7 +8,7 @@ import socket
 import statistics
 import time
 
-from exhibit import exhibit, main
+from exhibit import exhibit, main, wait_for
 from test_mishaps import held_up
 
 AWAY_S = 3.0  # that the last picture may be away
@@ -64,6 +64,14 @@ class Manager:
                 return True
         return False
 
+    def wait_state(self, wanted):
+        """Hears meanwhile: the daemon waits for a manager that does not."""
+        def there():
+            self.hear(0.01, lambda lines: False)
+            status = self.run.status()
+            return status if status["state"] == wanted else None
+        return wait_for(wanted, there)
+
     def watch(self):
         """Returns when the watchdog has not been fed for as long as the daemon may take."""
         while (left := self.fed + self.allowed - time.monotonic()) > 0:
@@ -84,9 +92,9 @@ def the_last_picture_is_back_within_three_seconds():
     machine with other things to do does not add to."""
     with exhibit() as run:
         manager, worked, away = Manager(run), [], []
-        run.wait_state("showing")
+        manager.wait_state("showing")
         for _ in range(HANGS):
-            manager.hear(60, lambda lines: "WATCHDOG=1" in lines)
+            assert manager.hear(60, lambda lines: "WATCHDOG=1" in lines)
             before = run.process.pid
             with held_up(before) as stopped:
                 if not stopped:
@@ -102,7 +110,7 @@ def the_last_picture_is_back_within_three_seconds():
             print(f"noticed after {noticed:.2f} s, dead after {died:.3f}, picture {manager.took:.2f} after the start of which "
                   f"{manager.used:.2f} of a processor's time: away for {away[-1]:.2f} s")
             assert run.process.pid != before
-            run.wait_state("showing")
+            manager.wait_state("showing")
         waited = unit("WatchdogSec") + unit("RestartSec")
         least = statistics.median(worked)
         print(f"waits {waited:.2f} s, works {least:.2f} s")
@@ -126,7 +134,7 @@ def the_last_picture_needs_nothing_that_takes_time():
         shutil.copy(run.content, content)
         run.write_config(content=content)
         manager = Manager(run, LD_LIBRARY_PATH="")  # meson names the build folder in it
-        run.wait_state("showing")
+        manager.wait_state("showing")
         run.stop(signal.SIGKILL)
         picture, stored = content.read_bytes(), transport.read_bytes()
         write_as_before(content, bytes(len(picture)))
@@ -142,7 +150,7 @@ def the_last_picture_needs_nothing_that_takes_time():
         write_as_before(content, picture)
         run.program = shutil.copy(run.program, run.folder / "counterlightd")  # away from libcounterlight-codecs.so
         manager.start()
-        held = run.wait_state("holding")
+        held = manager.wait_state("holding")
         assert held["frame"]["recalled"] and "libcounterlight-codecs.so" in held["why"], held
         # A file that changed is no content that the stored drive is for.
         run.stop()
