@@ -82,17 +82,18 @@ static store_source look_at(const char *path) {
 }
 
 static bool is_same(const store_source *a, const store_source *b) {
-  return a->stamp[0] != '\0' && strcmp(a->stamp, b->stamp) == 0 && strcmp(a->path, b->path) == 0;
+  return strcmp(a->stamp, b->stamp) == 0 && strcmp(a->path, b->path) == 0;
 }
 
-static void adopt(content *shown, clt_image *picture, const char *name, const store_source *from) {
+static void adopt(content *shown, clt_image *picture, const store_source *from) {
   clt_image_finish(&shown->picture);
   shown->picture = *picture;
   shown->identity = identify(picture);
   shown->from = *from;
-  if (name != shown->name) {
-    snprintf(shown->name, sizeof shown->name, "%s", name);
-  }
+}
+
+static void name_it(content *shown, const char *name) {
+  snprintf(shown->name, sizeof shown->name, "%s", name);
 }
 
 static void keep_record(const store *state, content *shown) {
@@ -147,7 +148,8 @@ clt_status content_take(const store *state, const char *configured, int descript
     status = clt_fail(error, CLT_BAD_INPUT, "%s: is damaged or no picture that can be read", name);
   }
   if (status == CLT_OK) {
-    adopt(shown, &picture, name, &(store_source){0});
+    adopt(shown, &picture, &(store_source){0});
+    name_it(shown, name);
   }
   if (status == CLT_OK && state->writable) {
     keep_copy(state, copy, ending, configured, shown);
@@ -163,7 +165,8 @@ clt_status content_reset(const store *state, const char *configured, content *sh
   if (status != CLT_OK) {
     return status;
   }
-  adopt(shown, &picture, configured, &from);
+  adopt(shown, &picture, &from);
+  name_it(shown, configured);
   if (shown->record.content[0] != '\0') {
     shown->record = (store_record){.drive_of = shown->record.drive_of, .drive_from = shown->record.drive_from};
     keep_record(state, shown);
@@ -179,16 +182,16 @@ clt_status content_open(const store *state, const char *configured, content *out
   bool brought = out->record.content[0] != '\0' && strcmp(out->record.configured, configured) == 0 &&
                  store_path(state, out->record.content, path, NULL) == CLT_OK;
   const store_source from = look_at(brought ? path : configured);
-  if (is_same(&from, &out->record.drive_from) && out->record.drive_of != 0) {
+  name_it(out, brought ? out->record.name : configured);
+  if (from.stamp[0] != '\0' && is_same(&from, &out->record.drive_from) && out->record.drive_of != 0) {
     out->identity = out->record.drive_of;
     out->from = from;
-    snprintf(out->name, sizeof out->name, "%s", brought ? out->record.name : configured);
     return CLT_OK;
   }
   if (!brought || clt_image_read(path, NULL, &picture, NULL) != CLT_OK) {
     return content_reset(state, configured, out, error);
   }
-  adopt(out, &picture, out->record.name, &from);
+  adopt(out, &picture, &from);
   return CLT_OK;
 }
 
@@ -200,7 +203,7 @@ clt_status content_decode(content *shown, clt_error *error) {
   const store_source from = look_at(shown->from.path);
   clt_status status = input_poster(from.path, &picture, error);
   if (status == CLT_OK) {
-    adopt(shown, &picture, shown->name, &from);
+    adopt(shown, &picture, &from);
   }
   return status;
 }
