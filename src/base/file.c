@@ -2,11 +2,22 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
+
+void clt_file_stamp(const char *path, char *stamp) {
+  struct stat file;
+  stamp[0] = '\0';
+  if (stat(path, &file) == 0 && S_ISREG(file.st_mode)) {
+    snprintf(stamp, CLT_STAMP_MAX, "%" PRIdMAX ".%09ld, %" PRIdMAX, (intmax_t)file.st_mtim.tv_sec, file.st_mtim.tv_nsec,
+             (intmax_t)file.st_size);
+  }
+}
 
 void clt_file_folder(const char *path, char *out) {
   const char *slash = strrchr(path, '/');

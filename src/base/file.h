@@ -7,6 +7,8 @@
 
 #include "counterlight/status.h"
 
+#define CLT_STAMP_MAX 64
+
 /* The temporary name under which the new content of path is written: same folder, ending kept (writers choose their
  * format by it), unique to this process and call. temporary has room for CLT_PATH_MAX. */
 clt_status clt_file_begin(const char *path, char *temporary, clt_error *error);
@@ -29,6 +31,9 @@ clt_status clt_text_open(clt_text *text, const char *path, clt_error *error);
 clt_status clt_text_close(clt_text *text, clt_status status, clt_error *error);
 /* Joins a folder and a relative name; an absolute name stays as it is. out has room for CLT_PATH_MAX. */
 clt_status clt_file_join(const char *folder, const char *name, char *out, clt_error *error);
+/* A regular file's time of change and size, "1764158400.123456789, 4711"; empty where it is none. stamp has room for
+ * CLT_STAMP_MAX. */
+void clt_file_stamp(const char *path, char *stamp);
 /* The folder part of a path ("." where it has none). out has room for CLT_PATH_MAX. */
 void clt_file_folder(const char *path, char *out);
 

@@ -55,6 +55,7 @@ static measure_kind scope(const control *self) {
 
 static void acquire(control *self) {
   self->wishes.acquire = true;
+  self->wishes.owed = false;
   self->found.progress = (measure_progress){0};
   control_measure(self, scope(self));
 }

@@ -74,10 +74,25 @@ static clt_status copy_file(int from, const char *path, clt_error *error) {
   return count == 0 ? CLT_OK : clt_fail(error, CLT_FAILED, "%s: cannot be copied there: %s", path, strerror(cause));
 }
 
-static void adopt(content *shown, clt_image *picture, const char *name) {
+static store_source look_at(const char *path) {
+  store_source from;
+  snprintf(from.path, sizeof from.path, "%s", path);
+  clt_file_stamp(path, from.stamp);
+  return from;
+}
+
+static bool is_same(const store_source *a, const store_source *b) {
+  return strcmp(a->stamp, b->stamp) == 0 && strcmp(a->path, b->path) == 0;
+}
+
+static void adopt(content *shown, clt_image *picture, const store_source *from) {
   clt_image_finish(&shown->picture);
   shown->picture = *picture;
   shown->identity = identify(picture);
+  shown->from = *from;
+}
+
+static void name_it(content *shown, const char *name) {
   snprintf(shown->name, sizeof shown->name, "%s", name);
 }
 
@@ -98,6 +113,7 @@ static void keep_copy(const store *state, const char *copy, const char *ending, 
     clt_log(CLT_LOG_WARNING, "the picture will not survive a restart: %s", error.message);
     return;
   }
+  shown->from = look_at(path);
   bool replaces = shown->record.content[0] != '\0' && strcmp(shown->record.content, file) != 0;
   bool stale = replaces && store_path(state, shown->record.content, older, NULL) == CLT_OK;
   snprintf(shown->record.content, sizeof shown->record.content, "%s", file);
@@ -132,7 +148,8 @@ clt_status content_take(const store *state, const char *configured, int descript
     status = clt_fail(error, CLT_BAD_INPUT, "%s: is damaged or no picture that can be read", name);
   }
   if (status == CLT_OK) {
-    adopt(shown, &picture, name);
+    adopt(shown, &picture, &(store_source){0});
+    name_it(shown, name);
   }
   if (status == CLT_OK && state->writable) {
     keep_copy(state, copy, ending, configured, shown);
@@ -143,13 +160,15 @@ clt_status content_take(const store *state, const char *configured, int descript
 
 clt_status content_reset(const store *state, const char *configured, content *shown, clt_error *error) {
   clt_image picture = {0};
+  const store_source from = look_at(configured);
   clt_status status = input_poster(configured, &picture, error);
   if (status != CLT_OK) {
     return status;
   }
-  adopt(shown, &picture, configured);
+  adopt(shown, &picture, &from);
+  name_it(shown, configured);
   if (shown->record.content[0] != '\0') {
-    shown->record = (store_record){.drive_of = shown->record.drive_of};
+    shown->record = (store_record){.drive_of = shown->record.drive_of, .drive_from = shown->record.drive_from};
     keep_record(state, shown);
   }
   return CLT_OK;
@@ -161,21 +180,42 @@ clt_status content_open(const store *state, const char *configured, content *out
   char path[CLT_PATH_MAX];
   clt_image picture = {0};
   bool brought = out->record.content[0] != '\0' && strcmp(out->record.configured, configured) == 0 &&
-                 store_path(state, out->record.content, path, NULL) == CLT_OK &&
-                 clt_image_read(path, NULL, &picture, NULL) == CLT_OK;
-  if (!brought) {
+                 store_path(state, out->record.content, path, NULL) == CLT_OK;
+  const store_source from = look_at(brought ? path : configured);
+  name_it(out, brought ? out->record.name : configured);
+  if (from.stamp[0] != '\0' && is_same(&from, &out->record.drive_from) && out->record.drive_of != 0) {
+    out->identity = out->record.drive_of;
+    out->from = from;
+    return CLT_OK;
+  }
+  if (!brought || clt_image_read(path, NULL, &picture, NULL) != CLT_OK) {
     return content_reset(state, configured, out, error);
   }
-  adopt(out, &picture, out->record.name);
+  adopt(out, &picture, &from);
   return CLT_OK;
+}
+
+clt_status content_decode(content *shown, clt_error *error) {
+  if (shown->picture.data != NULL) {
+    return CLT_OK;
+  }
+  clt_image picture = {0};
+  const store_source from = look_at(shown->from.path);
+  clt_status status = input_poster(from.path, &picture, error);
+  if (status == CLT_OK) {
+    adopt(shown, &picture, &from);
+  }
+  return status;
 }
 
 clt_status content_keep_drive(const store *state, content *shown, const clt_image *drive, clt_error *error) {
   clt_status status = store_save_drive(state, drive, error);
-  if (status != CLT_OK || shown->record.drive_of == shown->identity) {
+  if (status != CLT_OK ||
+      (shown->record.drive_of == shown->identity && is_same(&shown->from, &shown->record.drive_from))) {
     return status;
   }
   shown->record.drive_of = shown->identity;
+  shown->record.drive_from = shown->from;
   return store_write_record(state, &shown->record, error);
 }
 

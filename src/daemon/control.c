@@ -9,6 +9,8 @@
 
 #include "base/log.h"
 #include "base/memory.h"
+#include "daemon/resume.h"
+#include "daemon/store.h"
 
 void control_arm(sd_event_source *timer, double seconds) {
   sd_event_source_set_time_relative(timer, (uint64_t)(seconds * 1e6));
@@ -238,6 +240,9 @@ clt_status control_create(const daemon_boxes *boxes, listener *listening, const 
   daemon_config_copy(config, &self->config);
   self->wishes.content_descriptor = -1;
   self->wishes.acquire = !config->reuse;
+  char journal[CLT_PATH_MAX];
+  store_journal_path(config->state, journal);
+  self->wishes.owed = config->reuse && resume_is_owed(journal);
   self->found.content_serial = 1;
   self->found.verified_error = -1;
   snprintf(self->found.content, sizeof self->found.content, "%s", content);

@@ -26,6 +26,7 @@ typedef struct control_wishes {
   unsigned solver;        /* bit set of solver_kind */
   bool acquire;           /* a new transport is owed, through failures and retries, until it serves */
   bool anew;              /* it was asked for, so that none that was interrupted is resumed */
+  bool owed;              /* one of an earlier run goes on once the stored transport serves */
   measure_kind scope;     /* of that: MEASURE_PHOTOMETRY, MEASURE_CHANGED, MEASURE_GEOMETRY, else all of it */
   bool refine;            /* asked for, at the next verification */
   bool snapshot;          /* to be written when the picture has been photographed */

@@ -280,6 +280,9 @@ static void take_solved(control *self, solver_result *letter) {
   self->wishes.acquire = self->wishes.acquire && letter->kind != SOLVER_ADOPT;
   take_picture(self, letter);
   control_event(self, EVENT_SOLVED);
+  if (self->wishes.owed) {
+    control_event(self, EVENT_OWED);
+  }
   if (self->found.picture.compensated) {
     control_want(self, SOLVER_COST);
   }

@@ -126,6 +126,7 @@ typedef struct daemon_picture {
   clt_image target; /* wanted radiance; empty where the picture is uncompensated */
   clt_image lit;    /* 1 where a cell takes part, else 0 */
   bool compensated;
+  bool recalled; /* the drive is that of an earlier run, and nothing else of it is known */
   double white[CLT_CHANNELS_MAX];
   clt_compensation compensation;
 } daemon_picture;

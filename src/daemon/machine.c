@@ -9,15 +9,16 @@ static const char *const state_names[STATE_COUNT] = {
 };
 
 static const char *const event_names[EVENT_COUNT] = {
-    [EVENT_OPENED] = "opened",     [EVENT_CALIBRATED] = "calibrated",
-    [EVENT_LOADED] = "loaded",     [EVENT_UNKNOWN] = "unknown",
-    [EVENT_ACQUIRED] = "acquired", [EVENT_SOLVED] = "solved",
-    [EVENT_UNSOLVED] = "unsolved", [EVENT_VERIFIED] = "verified",
-    [EVENT_CHANGED] = "changed",   [EVENT_FAILED] = "failed",
-    [EVENT_LOST] = "lost",         [EVENT_VERIFY] = "verify",
-    [EVENT_RETRY] = "retry",       [EVENT_REACQUIRE] = "reacquire",
-    [EVENT_PICTURE] = "picture",   [EVENT_HOLD] = "hold",
-    [EVENT_RESUME] = "resume",     [EVENT_STOP] = "stop",
+    [EVENT_OPENED] = "opened",       [EVENT_CALIBRATED] = "calibrated",
+    [EVENT_LOADED] = "loaded",       [EVENT_UNKNOWN] = "unknown",
+    [EVENT_ACQUIRED] = "acquired",   [EVENT_SOLVED] = "solved",
+    [EVENT_UNSOLVED] = "unsolved",   [EVENT_VERIFIED] = "verified",
+    [EVENT_OWED] = "owed",           [EVENT_CHANGED] = "changed",
+    [EVENT_FAILED] = "failed",       [EVENT_LOST] = "lost",
+    [EVENT_VERIFY] = "verify",       [EVENT_RETRY] = "retry",
+    [EVENT_REACQUIRE] = "reacquire", [EVENT_PICTURE] = "picture",
+    [EVENT_HOLD] = "hold",           [EVENT_RESUME] = "resume",
+    [EVENT_STOP] = "stop",
 };
 
 static const char *const action_names[ACTION_COUNT] = {
@@ -86,6 +87,7 @@ static const machine_transition table[STATE_COUNT][EVENT_COUNT] =
         [STATE_SHOWING] =
             {
                 [EVENT_SOLVED] = {STATE_SHOWING, ACTION_SHOW},
+                [EVENT_OWED] = {STATE_ACQUIRING, ACTION_ACQUIRE},
                 [EVENT_LOST] = {STATE_HOLDING, ACTION_BACK_OFF},
                 [EVENT_VERIFY] = {STATE_VERIFYING, ACTION_VERIFY},
                 [EVENT_REACQUIRE] = {STATE_ACQUIRING, ACTION_ACQUIRE},

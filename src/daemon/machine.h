@@ -26,6 +26,7 @@ typedef enum machine_event {
   EVENT_SOLVED,     /* a drive was computed */
   EVENT_UNSOLVED,   /* it could not be */
   EVENT_VERIFIED,   /* the picture was photographed and is as predicted */
+  EVENT_OWED,       /* an acquisition that was interrupted by the end of an earlier run is to go on */
   EVENT_CHANGED,    /* the picture is further off than the configuration allows: the room has changed */
   EVENT_FAILED,     /* opening, calibrating or measuring failed */
   EVENT_LOST,       /* the projector is gone */

@@ -26,6 +26,7 @@ typedef struct measurer {
   measure_job *waiting;     /* came while another was worked on */
   uint64_t number;          /* of the job in work */
   camera_frames closed;     /* by rigs that are closed */
+  bool first;               /* no acquisition has begun yet */
   int64_t reported_ns;
 } measurer;
 
@@ -276,7 +277,7 @@ static clt_status work(measurer *self, measure_job *job, measure_result *result)
   if (observes(job->kind) && (self->station == NULL || self->station->rig == NULL)) {
     return clt_fail(&result->error, CLT_GONE, "the rig is not open");
   }
-  resume_begin(job);
+  resume_begin(job, &self->first);
   switch (job->kind) {
   case MEASURE_CALIBRATE:
     return calibrate(self, job, result);
@@ -322,7 +323,7 @@ static void answer(measurer *self, measure_job *job) {
 }
 
 void *measure_run(void *boxes) {
-  measurer self = {.boxes = boxes};
+  measurer self = {.boxes = boxes, .first = true};
   bool stopping = false;
   while (!stopping) {
     measure_job *job = self.waiting != NULL ? self.waiting : clt_mailbox_take(self.boxes->measure_jobs, -1);

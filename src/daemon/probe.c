@@ -46,6 +46,12 @@ static pid_t start(const char *path) {
   return child;
 }
 
+/* By whoever stops all of the daemon's processes, which tells nothing of the file. */
+static bool was_asked_to_end(int outcome) {
+  return WIFSIGNALED(outcome) &&
+         (WTERMSIG(outcome) == SIGTERM || WTERMSIG(outcome) == SIGINT || WTERMSIG(outcome) == SIGHUP);
+}
+
 bool probe_transport(const char *path) {
   struct stat about;
   double seconds = patience_s + (stat(path, &about) == 0 ? (double)about.st_size / slowest : 0);
@@ -62,5 +68,6 @@ bool probe_transport(const char *path) {
   }
   int outcome = 0;
   waitpid(child, &outcome, 0);
-  return WIFEXITED(outcome) && (WEXITSTATUS(outcome) == WHOLE || WEXITSTATUS(outcome) == REFUSED);
+  bool ended_well = WIFEXITED(outcome) && (WEXITSTATUS(outcome) == WHOLE || WEXITSTATUS(outcome) == REFUSED);
+  return ended_well || was_asked_to_end(outcome);
 }

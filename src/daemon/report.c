@@ -136,8 +136,9 @@ json_t *control_moving_note(const control *self) {
 static json_t *frame_note(const control_findings *found) {
   const clt_compensation *made = &found->picture.compensation;
   bool compensated = found->picture.compensated;
-  json_t *note = json_pack("{s:f, s:I, s:I, s:b}", "fps", found->frames.fps, "late", (json_int_t)found->frames.late,
-                           "presented", (json_int_t)found->frames.presented, "compensated", compensated);
+  json_t *note = json_pack("{s:f, s:I, s:I, s:b, s:b}", "fps", found->frames.fps, "late",
+                           (json_int_t)found->frames.late, "presented", (json_int_t)found->frames.presented,
+                           "compensated", compensated, "recalled", found->picture.recalled);
   json_object_set_new(note, "solve_ms", compensated ? known(1e3 * made->solve.seconds) : json_null());
   json_object_set_new(note, "error", compensated ? known(made->error_after) : json_null());
   json_object_set_new(note, "error_before", compensated ? known(made->error_before) : json_null());

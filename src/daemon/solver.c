@@ -8,6 +8,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/places.h"
+#include "daemon/resume.h"
 #include "tradeoff/json.h"
 
 /* That a measurement of what accuracy costs may take, roughly. */
@@ -34,17 +35,17 @@ static void state_facts(const daemon_model *model, transport_facts *facts) {
 }
 
 /* The content at another size. */
-static clt_status fit(const solver *self, int width, int height, int channels, clt_image *out, clt_error *error) {
+static clt_status fit(solver *self, int width, int height, int channels, clt_image *out, clt_error *error) {
   clt_image resized = {0};
-  clt_status status = clt_image_resize(&self->shown.picture, height, width, &resized, error);
+  clt_status status = content_decode(&self->shown, error);
+  status = status == CLT_OK ? clt_image_resize(&self->shown.picture, height, width, &resized, error) : status;
   status = status == CLT_OK ? clt_image_convert(&resized, channels, out, error) : status;
   clt_image_finish(&resized);
   return status;
 }
 
 /* x = picture, within what a projector can show. */
-static clt_status leave_uncompensated(const solver *self, const solver_job *job, daemon_picture *out,
-                                      clt_error *error) {
+static clt_status leave_uncompensated(solver *self, const solver_job *job, daemon_picture *out, clt_error *error) {
   clt_status status = fit(self, job->width, job->height, job->channels, &out->drive, error);
   for (size_t i = 0; status == CLT_OK && i < clt_image_size(&out->drive); i++) {
     float light = out->drive.data[i];
@@ -67,10 +68,8 @@ static bool recall_drive(const solver *self, const solver_job *job, clt_image *d
 }
 
 static clt_status prepare(solver *self, solver_job *job, solver_result *result) {
-  if (recall_drive(self, job, &result->picture.drive)) {
-    return CLT_OK;
-  }
-  return leave_uncompensated(self, job, &result->picture, &result->error);
+  result->picture.recalled = recall_drive(self, job, &result->picture.drive);
+  return result->picture.recalled ? CLT_OK : leave_uncompensated(self, job, &result->picture, &result->error);
 }
 
 /* The cells that take part, as a picture of ones and zeros. */
@@ -87,7 +86,7 @@ static clt_status mark_lit(const clt_certificate *certificate, const clt_image *
   return status;
 }
 
-static clt_status compensate(const solver *self, const solver_job *job, const daemon_model *model, daemon_picture *out,
+static clt_status compensate(solver *self, const solver_job *job, const daemon_model *model, daemon_picture *out,
                              clt_error *error) {
   const clt_transport *transport = model->transport;
   const clt_certificate *certificate = model->certificate;
@@ -176,8 +175,10 @@ static clt_status adopt_measured(solver *self, solver_job *job, solver_result *r
 
 /* One that cannot serve would not by being taken from the journal either. */
 static clt_status adopt(solver *self, solver_job *job, solver_result *result) {
+  char journal[CLT_PATH_MAX];
   clt_status status = adopt_measured(self, job, result);
-  store_drop_journal(self->state);
+  store_journal_path(self->state->folder, journal);
+  resume_drop(journal);
   return status;
 }
 

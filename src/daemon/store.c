@@ -95,6 +95,8 @@ void store_read_record(const store *state, store_record *record) {
   take_text(document, "configured", record->configured, sizeof record->configured);
   take_text(document, "content", record->content, sizeof record->content);
   take_text(document, "name", record->name, sizeof record->name);
+  take_text(document, "drive_from", record->drive_from.path, sizeof record->drive_from.path);
+  take_text(document, "stamp", record->drive_from.stamp, sizeof record->drive_from.stamp);
   const char *identity = json_string_value(json_object_get(document, "drive_of"));
   record->drive_of = identity != NULL ? strtoull(identity, NULL, 16) : 0;
   if (strchr(record->content, '/') != NULL) {
@@ -116,8 +118,9 @@ clt_status store_write_record(const store *state, const store_record *record, cl
     return status;
   }
   snprintf(identity, sizeof identity, "%016" PRIx64, record->drive_of);
-  json_t *document = json_pack("{s:s, s:s, s:s, s:s}", "configured", record->configured, "content", record->content,
-                               "name", record->name, "drive_of", identity);
+  json_t *document = json_pack("{s:s, s:s, s:s, s:s, s:s, s:s}", "configured", record->configured, "content",
+                               record->content, "name", record->name, "drive_of", identity, "drive_from",
+                               record->drive_from.path, "stamp", record->drive_from.stamp);
   char *text = document != NULL ? json_dumps(document, JSON_INDENT(2)) : NULL;
   status = text != NULL ? clt_file_write(path, text, strlen(text), error)
                         : clt_fail(error, CLT_FAILED, "%s: a path in it is no UTF-8", path);
@@ -190,14 +193,6 @@ clt_status store_save_transport(const store *state, const clt_transport *transpo
 void store_journal_path(const char *folder, char path[CLT_PATH_MAX]) {
   if (clt_file_join(folder, journal_name, path, NULL) != CLT_OK) {
     path[0] = '\0';
-  }
-}
-
-void store_drop_journal(const store *state) {
-  char path[CLT_PATH_MAX];
-  store_journal_path(state->folder, path);
-  if (unlink(path) != 0 && errno != ENOENT && state->writable) {
-    clt_log(CLT_LOG_WARNING, "%s cannot be removed: %s", path, strerror(errno));
   }
 }
 

@@ -4,7 +4,8 @@
  *   transport.h5   the transport in use, replaced only by a complete newer one
  *   content.EXT    the picture that `show` brought, as it came
  *   drive.npy      the last drive
- *   acquisition.journal  what an acquisition under way has measured
+ *   acquisition.journal  what an acquisition under way has measured, with .starts behind it how many starts went on
+ *                        with that (resume.c)
  *   state.json     which content, and of what content the drive is
  *   snapshot/      the pictures of the last snapshot
  *
@@ -15,6 +16,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "base/file.h"
 #include "counterlight/image.h"
 #include "counterlight/transport.h"
 
@@ -24,12 +26,19 @@ typedef struct store {
   bool writable;
 } store;
 
+/* A file as it was when it was read. */
+typedef struct store_source {
+  char path[CLT_PATH_MAX];
+  char stamp[CLT_STAMP_MAX]; /* clt_file_stamp; empty: not known */
+} store_source;
+
 /* What state.json says. */
 typedef struct store_record {
   char configured[CLT_PATH_MAX]; /* the configuration's content when `show` was asked; empty: no `show` */
   char content[64];              /* file in the folder that is shown instead; empty: the configured one */
   char name[CLT_PATH_MAX];       /* what people call that */
-  uint64_t drive_of;             /* content that the stored drive is for (content_identity); 0: none */
+  uint64_t drive_of;             /* content that the stored drive is for (content.identity); 0: none */
+  store_source drive_from;       /* what that was read from */
 } store_record;
 
 /* Makes the folder, takes its lock and removes what an earlier daemon left half-written. CLT_FAILED where another
@@ -53,9 +62,6 @@ bool store_is_foreign(const clt_transport *transport, int width, int height, int
  * transport.h5.old. */
 clt_transport *store_load_transport(const store *state, int width, int height, int channels, const char *source);
 clt_status store_save_transport(const store *state, const clt_transport *transport, clt_error *error);
-
-/* What a finished acquisition was resumed by goes; the next one is of its own. */
-void store_drop_journal(const store *state);
 
 clt_status store_save_drive(const store *state, const clt_image *drive, clt_error *error);
 /* False where there is none that can be read. */

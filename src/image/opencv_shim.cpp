@@ -1,5 +1,3 @@
-#include "image/opencv_shim.h"
-
 #include <climits>
 #include <cstdlib>
 #include <cstring>
@@ -9,15 +7,10 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "image/codecs.h"
 #include "image/opencv_guard.hpp"
 
 namespace {
-
-/* Debian's OpenCV has its EXR codec switched off until this variable is set. It is set while the program is loaded,
- * because later another thread may be reading the environment. */
-__attribute__((constructor)) void enable_exr() {
-  setenv("OPENCV_IO_ENABLE_OPENEXR", "1", 1);
-}
 
 /* Runs work in silence, with every exception caught. */
 template <typename Work> clt_status guarded(const char *path, const char *what, clt_error *error, Work work) {
@@ -60,10 +53,8 @@ clt_status keep(const char *path, const cv::Mat &image, clt_raster *raster, clt_
   return CLT_OK;
 }
 
-} // namespace
-
-clt_status clt_opencv_decode(const char *path, const unsigned char *bytes, size_t size, bool grey, clt_raster *raster,
-                             clt_error *error) {
+clt_status decode(const char *path, const unsigned char *bytes, size_t size, bool grey, clt_raster *raster,
+                  clt_error *error) {
   *raster = clt_raster{};
   if (size > INT_MAX) {
     return clt_fail(error, CLT_BAD_INPUT, "%s: is larger than 2 GiB; give a smaller picture", path);
@@ -75,8 +66,8 @@ clt_status clt_opencv_decode(const char *path, const unsigned char *bytes, size_
   });
 }
 
-clt_status clt_opencv_encode(const char *path, const char *ending, const clt_raster *raster, unsigned char **bytes,
-                             size_t *size, clt_error *error) {
+clt_status encode(const char *path, const char *ending, const clt_raster *raster, unsigned char **bytes, size_t *size,
+                  clt_error *error) {
   *bytes = nullptr;
   return guarded(path, "cannot be encoded", error, [&] {
     std::vector<unsigned char> encoded;
@@ -93,14 +84,14 @@ clt_status clt_opencv_encode(const char *path, const char *ending, const clt_ras
   });
 }
 
-clt_status clt_opencv_read_exr(const char *path, clt_raster *raster, clt_error *error) {
+clt_status read_exr(const char *path, clt_raster *raster, clt_error *error) {
   *raster = clt_raster{};
   return guarded(path, "cannot be decoded", error, [&] {
     return keep(path, cv::imread(path, cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR), raster, error);
   });
 }
 
-clt_status clt_opencv_write_exr(const char *path, const clt_raster *raster, clt_error *error) {
+clt_status write_exr(const char *path, const clt_raster *raster, clt_error *error) {
   return guarded(path, "cannot be written", error, [&] {
     if (!cv::imwrite(path, swapped(borrow(raster)))) {
       return clt_fail(error, CLT_FAILED, "%s: cannot be written: the disk may be full", path);
@@ -108,3 +99,7 @@ clt_status clt_opencv_write_exr(const char *path, const clt_raster *raster, clt_
     return CLT_OK;
   });
 }
+
+} // namespace
+
+extern "C" const clt_picture_codecs clt_module_pictures = {decode, encode, read_exr, write_exr};

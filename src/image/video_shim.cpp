@@ -1,11 +1,10 @@
-#include "image/video_shim.h"
-
 #include <cmath>
 #include <memory>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <string>
 
+#include "image/codecs.h"
 #include "image/opencv_guard.hpp"
 
 struct clt_video {
@@ -35,9 +34,16 @@ clt_status open_first(clt_video *video, clt_error *error) {
   return CLT_OK;
 }
 
-} // namespace
+// Not every decoder seeks: the file is opened again.
+clt_status rewind_video(clt_video *video, clt_error *error) {
+  return clt_guarded(video->path.c_str(), "cannot be opened again", error, [&] {
+    return open_file(video)
+               ? CLT_OK
+               : clt_fail(error, CLT_BAD_INPUT, "%s: cannot be opened again; is it there?", video->path.c_str());
+  });
+}
 
-clt_status clt_video_open(const char *path, clt_video **out, clt_video_info *info, clt_error *error) {
+clt_status open_video(const char *path, clt_video **out, clt_video_info *info, clt_error *error) {
   return clt_guarded(path, "cannot be opened", error, [&] {
     auto video = std::make_unique<clt_video>();
     video->path = path;
@@ -50,17 +56,17 @@ clt_status clt_video_open(const char *path, clt_video **out, clt_video_info *inf
     video->width = video->frame.cols;
     video->height = video->frame.rows;
     *info = {video->width, video->height, sane ? rate_hz : usual_rate_hz};
-    status = clt_video_rewind(video.get(), error);
+    status = rewind_video(video.get(), error);
     *out = status == CLT_OK ? video.release() : nullptr;
     return status;
   });
 }
 
-void clt_video_close(clt_video *video) {
+void close_video(clt_video *video) {
   delete video;
 }
 
-clt_status clt_video_read(clt_video *video, const int rectangle[4], uint8_t *codes, bool *end, clt_error *error) {
+clt_status read_frame(clt_video *video, const int rectangle[4], uint8_t *codes, bool *end, clt_error *error) {
   return clt_guarded(video->path.c_str(), "cannot be decoded", error, [&] {
     bool more = video->capture.read(video->frame);
     // A frame of another size, as a damaged file may have, ends the film as well.
@@ -74,11 +80,6 @@ clt_status clt_video_read(clt_video *video, const int rectangle[4], uint8_t *cod
   });
 }
 
-// Not every decoder seeks: the file is opened again.
-clt_status clt_video_rewind(clt_video *video, clt_error *error) {
-  return clt_guarded(video->path.c_str(), "cannot be opened again", error, [&] {
-    return open_file(video)
-               ? CLT_OK
-               : clt_fail(error, CLT_BAD_INPUT, "%s: cannot be opened again; is it there?", video->path.c_str());
-  });
-}
+} // namespace
+
+extern "C" const clt_video_codecs clt_module_videos = {open_video, close_video, read_frame, rewind_video};

@@ -1,4 +1,5 @@
 #include <dirent.h>
+#include <fcntl.h>
 #include <sys/stat.h>
 
 #include "base/file.h"
@@ -92,12 +93,30 @@ static void a_text_becomes_a_file_only_where_all_went_well(void **state) {
   assert_int_equal(entries_in(folder), 1);
 }
 
+static void a_stamp_is_of_a_file_as_it_is(void **state) {
+  (void)state;
+  char folder[64], path[CLT_PATH_MAX], stamp[CLT_STAMP_MAX];
+  const struct timespec times[] = {{5, 0}, {1764158400, 7}};
+  clt_error error = {0};
+  test_folder(folder);
+  assert_ok(clt_file_join(folder, "picture.png", path, &error), error);
+  clt_file_stamp(path, stamp);
+  assert_string_equal(stamp, "");
+  assert_ok(clt_file_write(path, "picture", 7, &error), error);
+  assert_int_equal(utimensat(AT_FDCWD, path, times, 0), 0);
+  clt_file_stamp(path, stamp);
+  assert_string_equal(stamp, "1764158400.000000007, 7");
+  clt_file_stamp(folder, stamp);
+  assert_string_equal(stamp, "");
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(a_file_is_replaced_whole_and_leaves_nothing_behind),
       cmocka_unit_test(what_cannot_be_written_is_said),
       cmocka_unit_test(a_target_that_is_a_folder_is_kept),
       cmocka_unit_test(a_text_becomes_a_file_only_where_all_went_well),
+      cmocka_unit_test(a_stamp_is_of_a_file_as_it_is),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -69,6 +69,14 @@ def shown():
     return None
 
 
+def recalled():
+    """The status where the last run's picture is on the glass, or a newer one."""
+    with contextlib.suppress(OSError, AssertionError, ValueError):
+        frame = status()["frame"]
+        return frame if (frame["recalled"] or frame["compensated"]) and frame["presented"] > 0 else None
+    return None
+
+
 def wait_showing():
     def showing():
         found = shown()
@@ -175,10 +183,13 @@ def hang(stop):
         assert done
         began = time.monotonic()
         wait_for("another process", lambda: another(before))
-        first = wait_for("its picture", shown)
+        wait_for("its picture", recalled)
         passed = time.monotonic() - began
-    assert (STATE / "drive.npy").read_bytes() == drive and first["frame"]["compensated"]
-    return passed
+        assert (STATE / "drive.npy").read_bytes() == drive
+        wait_for("its picture, computed again", shown)
+        computed = time.monotonic() - began
+    assert (STATE / "drive.npy").read_bytes() == drive
+    return passed, computed
 
 
 @contextlib.contextmanager
@@ -192,9 +203,9 @@ def a_hung_frame_loop_is_back_within_three_seconds():
     take none: these are the seconds that are waited."""
     from test_mishaps import held_up
     for stop in (stopped, held_up):
-        since, passed = cursor(), hang(stop)
-        print(f"{stop.__name__}: back after {passed:.2f} s")
-        assert passed <= BACK_S, passed
+        since, (passed, computed) = cursor(), hang(stop)
+        print(f"{stop.__name__}: back after {passed:.2f} s, computed again after {computed:.2f} s")
+        assert passed <= computed <= BACK_S, (passed, computed)
         assert "Watchdog timeout" in journal(since)
 
 
@@ -215,6 +226,7 @@ def killed_while_it_measures_it_comes_back():
             met.append([client.ask("status")["state"] for _ in range(dice.randrange(1, 5))][-1])
         os.kill(before, signal.SIGKILL)
         wait_for("another process", lambda: another(before))
+        wait_for("what it was at to be ended", lambda: not (STATE / "acquisition.journal").exists())
         wait_showing()
         assert numpy.linalg.norm(stored_transport() - first) < NOISE * numpy.linalg.norm(first)
     print("killed while", collections.Counter(met))

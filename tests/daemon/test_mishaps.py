@@ -4,6 +4,7 @@ import contextlib
 import ctypes
 import os
 import random
+import re
 import signal
 import socket
 import subprocess
@@ -15,6 +16,7 @@ import numpy
 from exhibit import exhibit, main, wait_for
 
 KILLS, PHASES = int(os.environ.get("CLT_KILLS", "50")), ("acquiring", "solving", "saving")
+STATES = ("opening", "calibrating", "acquiring", "solving", "showing", "verifying", "holding", "stopping")
 NOISE = 0.02  # by which two measured transports differ
 PTRACE_SEIZE, PTRACE_INTERRUPT, PTRACE_DETACH = 0x4206, 0x4207, 17
 
@@ -29,11 +31,12 @@ def stored_transport(run):
 
 
 def phase(run, said):
-    """What the daemon is at: a state, as the log tells it after what was `said` before, or saving where it is writing a
-    file."""
-    if run.state.exists() and any(name.startswith(f".new-{run.process.pid}-") for name in os.listdir(run.state)):
-        return "saving"
-    return run.said()[said:].rstrip().rsplit("\n", 1)[-1].split(" ")[0].rstrip(":")
+    """What the daemon is at: a state, as the log tells it after what was `said` before, or saving where it is writing what
+    it solved with."""
+    told = re.findall(rf"^({'|'.join(STATES)})\b", run.said()[said:], re.M)
+    state = told[-1] if told else ""
+    saves = state == "solving" and any(name.startswith(f".new-{run.process.pid}-") for name in os.listdir(run.state))
+    return "saving" if saves else state
 
 
 def pass_phases(run):

@@ -82,16 +82,55 @@ def a_camera_that_comes_back_goes_on():
         assert_resumed(run, before, known)
 
 
+def kill_and_start(run):
+    """Gives what is said from then on."""
+    run.stop(9)
+    said = len(run.said())
+    run.start()
+    return lambda: run.said()[said:]
+
+
+def reacquire(run, done):
+    with run.client() as client:
+        client.ask("reacquire")
+    return interrupted_at(run, done)
+
+
+def is_acquiring(run):
+    """The status while an acquisition is under way that has observed something, else None."""
+    status = run.status()
+    begun = status["state"] == "acquiring" and status["progress"] is not None and status["progress"]["done"] > 0
+    return status if begun else None
+
+
 def a_daemon_that_was_killed_goes_on():
+    """Without a transport; beside one that is stored, which serves meanwhile; but not for ever."""
     known = undisturbed()
     with exhibit() as run:
         prepare(run)
         run.start()
         before = interrupted_at(run, 100)
-        run.stop(9)
-        run.start()
-        run.wait_state("showing")
+        kill_and_start(run)
+        first = run.wait_state("showing")["transport"]
         assert_resumed(run, before, known)
+        before = reacquire(run, 100)
+        says = kill_and_start(run)
+        status = wait_for("acquiring", lambda: is_acquiring(run))
+        assert status["frame"]["compensated"] and status["transport"] == first, status
+        assert "goes on (start 1 of at most 3)" in says()
+        wait_for("what was measured before", lambda: progress(run)["resumed"] >= before)
+        assert run.wait_state("showing")["transport"] != first
+        assert_resumed(run, before, known)
+        stored = (run.state / "transport.h5").read_bytes()
+        reacquire(run, 60)
+        for again in range(1, 4):
+            says = kill_and_start(run)
+            wait_for("acquiring", lambda: is_acquiring(run))
+            assert f"goes on (start {again} of at most 3)" in says()
+        says = kill_and_start(run)
+        run.wait_state("showing")
+        assert "is given up that 3 starts went on with" in says() and "acquiring" not in says()
+        assert (run.state / "transport.h5").read_bytes() == stored and not list(run.state.glob("acquisition*"))
 
 
 def what_was_held_goes_on_and_what_is_asked_for_begins_anew():

@@ -1,12 +1,15 @@
 """What is in the state directory at the start: whole, damaged, of another room, or not writable."""
+import contextlib
 import os
+import pathlib
 import shutil
+import signal
 import subprocess
 
 import h5py
 import numpy
 
-from exhibit import exhibit, main
+from exhibit import exhibit, main, wait_for
 
 
 def made(run):
@@ -70,6 +73,28 @@ def a_transport_that_breaks_the_reader_is_moved_aside():
         aside, = run.state.glob("transport.h5.bad-*")
         assert aside.read_bytes() == spoiled and "stored transport cannot be used" in run.said()
     return None
+
+
+def probing(daemon):
+    """The process by which the daemon finds out whether its transport breaks the reader, or None."""
+    for thread in os.listdir(f"/proc/{daemon}/task"):
+        with contextlib.suppress(OSError):
+            for child in map(int, pathlib.Path(f"/proc/{daemon}/task/{thread}/children").read_text().split()):
+                if b"--try-transport" in pathlib.Path(f"/proc/{child}/cmdline").read_bytes():
+                    return child
+    return None
+
+
+def a_transport_survives_an_order_to_stop_while_it_is_tried():
+    """systemd ends all processes of a service, and so a terminal does."""
+    with exhibit(8, 6) as run:
+        whole = made(run)
+        for number in (signal.SIGTERM, signal.SIGINT):
+            run.start()
+            os.kill(wait_for("the trial", lambda: probing(run.process.pid), pause=0.001), number)
+            run.process.send_signal(number)
+            assert run.process.wait() == 0
+            assert (run.state / "transport.h5").read_bytes() == whole and not list(run.state.glob("*.bad-*")), run.said()
 
 
 def a_transport_of_another_grid_or_room_is_not_used():
@@ -153,6 +178,7 @@ def left_overs_of_a_killed_daemon_are_swept():
 
 if __name__ == "__main__":
     main([damaged_transports_are_moved_aside_and_measured_anew, a_transport_that_breaks_the_reader_is_moved_aside,
+          a_transport_survives_an_order_to_stop_while_it_is_tried,
           a_transport_of_another_grid_or_room_is_not_used, a_transport_that_anyone_wrote_is_used,
           damaged_records_and_drives_do_not_matter, a_state_directory_that_cannot_be_written_is_a_warning,
           left_overs_of_a_killed_daemon_are_swept])

@@ -1,8 +1,11 @@
 """A station on tests/vm/scene.cfg: its configuration, its calibration, its daemon, and how near it comes to the target."""
+import os
 import pathlib
+import re
 import subprocess
 import sys
 
+import h5py
 import numpy as np
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -49,9 +52,19 @@ class Station:
         self.configure('calibration = "calibration/calibration.h5";')
 
     def start(self):
+        """glibc maps a large block by itself until the first such block is freed; from then on it keeps up to 32 MiB of such
+        blocks, among them the earlier of two transports. A threshold that is given stays, and what is resident is what
+        the daemon holds."""
         with open(self.folder / "log", "wb") as log:
             self.process = subprocess.Popen([self.counterlightd, "--config", self.config, "--socket", self.socket,
-                                            "--state", self.folder / "state"], stderr=log)
+                                            "--state", self.folder / "state"], stderr=log,
+                                            env=dict(os.environ, MALLOC_MMAP_THRESHOLD_=str(1 << 20)))
+
+    def resumed(self):
+        """Patterns of the stored transport that were observed before an interruption."""
+        with h5py.File(self.folder / "state" / "transport.h5") as file:
+            found = re.search(r"(\d+) patterns from before an interruption", str(file.attrs["plan"]))
+        return int(found[1]) if found else 0
 
     def said(self):
         return (self.folder / "log").read_text(errors="replace")
