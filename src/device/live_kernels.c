@@ -32,6 +32,13 @@ INLINE void split(const uint8_t *codes, size_t count, uint8_t *plane) {
   }
 }
 
+INLINE void expand(const float *own, const int32_t *at, const float *part, size_t done, size_t count, float *out) {
+  for (size_t x = done; x < count; x++) {
+    const float value = own[at[x]];
+    out[x] = value + part[x] * (own[at[x] + 1] - value);
+  }
+}
+
 /* Pieces are loaded one by one and sorted in registers: gathers are not faster, and missing from many processors. */
 INLINE void interpolate(const clt_live_piece *piece, const int32_t *at, const float *part, size_t count, float *out) {
   size_t x = 0;
@@ -82,10 +89,27 @@ INLINE float scatter(uint32_t key) {
   return (float)(int32_t)((key ^ (key >> 16)) >> 8) * 0x1p-24F;
 }
 
+INLINE int32_t step_of(float code, int32_t full, uint32_t key) {
+  const int32_t step = (int32_t)(code * (float)full + scatter(key));
+  return step < full ? step : full;
+}
+
 INLINE void dither(float *codes, size_t count, float full, uint32_t start) {
   for (size_t k = 0; k < count; k++) {
-    const float step = (float)(int32_t)(codes[k] * full + scatter(start + (uint32_t)k));
-    codes[k] = (step < full ? step : full) / full;
+    codes[k] = (float)step_of(codes[k], (int32_t)full, start + (uint32_t)k) / full;
+  }
+}
+
+INLINE void paint(const float *const codes[CLT_LIVE_COLOURS], const uint32_t start[CLT_LIVE_COLOURS], size_t count,
+                  uint32_t *restrict pixels) {
+  enum { FULL = 255 };
+  const float *restrict red = codes[0], *restrict green = codes[1], *restrict blue = codes[2];
+  const uint32_t first = start[0], second = start[1], third = start[2];
+  for (int32_t x = 0; x < (int32_t)count; x++) {
+    const uint32_t key = (uint32_t)x;
+    const int32_t r = step_of(red[x], FULL, first + key), g = step_of(green[x], FULL, second + key),
+                  b = step_of(blue[x], FULL, third + key);
+    pixels[x] = (uint32_t)(r << 16 | g << 8 | b);
   }
 }
 
@@ -107,24 +131,52 @@ INLINE void dither(float *codes, size_t count, float full, uint32_t start) {
   attributes static void dither_##name(float *codes, size_t count, float full, uint32_t start) {                       \
     dither(codes, count, full, start);                                                                                 \
   }                                                                                                                    \
+  attributes static void paint_##name(const float *const codes[CLT_LIVE_COLOURS],                                      \
+                                      const uint32_t start[CLT_LIVE_COLOURS], size_t count, uint32_t *pixels) {        \
+    paint(codes, start, count, pixels);                                                                                \
+  }                                                                                                                    \
   static const clt_live_row_kernels name = {.needs = NEEDS_##name,                                                     \
                                             .runs_here = has_##name,                                                   \
                                             .split = split_##name,                                                     \
+                                            .expand = expand_##name,                                                   \
                                             .interpolate = interpolate_##name,                                         \
                                             .drive = drive_##name,                                                     \
                                             .place = place_##name,                                                     \
-                                            .dither = dither_##name};
+                                            .dither = dither_##name,                                                   \
+                                            .paint = paint_##name};
 
 static bool has_portable(void) {
   return true;
+}
+
+static void expand_portable(const float *own, const int32_t *at, const float *part, size_t count, float *out) {
+  expand(own, at, part, 0, count, out);
 }
 
 #define NEEDS_portable NULL
 VARIANT(portable, )
 
 #if defined(__x86_64__)
+#include <immintrin.h>
+
 static bool has_avx2(void) {
   return __builtin_cpu_supports("avx2");
+}
+
+/* Eight columns lie between two of eight cells as a rule: a panel has more columns than its grid. */
+__attribute__((target("avx2"))) static void expand_avx2(const float *own, const int32_t *at, const float *part,
+                                                        size_t count, float *out) {
+  enum { LANES = 8 };
+  size_t x = 0;
+  for (; x + LANES <= count && at[x + LANES - 1] - at[x] < LANES; x += LANES) {
+    const float *first = own + at[x];
+    const __m256i lane = _mm256_sub_epi32(_mm256_loadu_si256((const __m256i *)(at + x)), _mm256_set1_epi32(at[x]));
+    const __m256 value = _mm256_permutevar8x32_ps(_mm256_loadu_ps(first), lane);
+    const __m256 next = _mm256_permutevar8x32_ps(_mm256_loadu_ps(first + 1), lane);
+    const __m256 way = _mm256_mul_ps(_mm256_loadu_ps(part + x), _mm256_sub_ps(next, value));
+    _mm256_storeu_ps(out + x, _mm256_add_ps(value, way));
+  }
+  expand(own, at, part, x, count, out);
 }
 
 #define NEEDS_avx2 "AVX2"

@@ -21,6 +21,25 @@ static void check_split(const clt_live_row_kernels *variant, size_t count, uint6
   }
 }
 
+/* Columns between cells that lie close together, and far apart. */
+static void check_expand(const clt_live_row_kernels *variant, size_t count, uint64_t *random) {
+  const double cells_a_column = count % 3 == 0 ? 1.9 : test_random(random);
+  float own[2 * MOST + CLT_LIVE_PAD], part[MOST], out[MOST + 1];
+  int32_t at[MOST];
+  fill(own, 2 * MOST + CLT_LIVE_PAD, -1, 1, random);
+  fill(part, count, 0, 1, random);
+  for (size_t x = 0; x < count; x++) {
+    at[x] = (int32_t)(cells_a_column * (double)x);
+  }
+  out[count] = 9;
+  variant->expand(own, at, part, count, out);
+  for (size_t x = 0; x < count; x++) {
+    const double value = (double)own[at[x]], next = (double)own[at[x] + 1];
+    assert_near(out[x], value + (double)part[x] * (next - value), 4e-7);
+  }
+  assert_near(out[count], 9, 0);
+}
+
 static void check_interpolate(const clt_live_row_kernels *variant, size_t count, uint64_t *random) {
   enum { PIECES = 17 };
   clt_live_piece piece[PIECES];
@@ -100,16 +119,37 @@ static void check_dither(const clt_live_row_kernels *variant, size_t count, uint
   }
 }
 
+/* Steps of dither, put together. */
+static void check_paint(const clt_live_row_kernels *variant, size_t count, uint64_t *random) {
+  const uint32_t start[COLOURS] = {(uint32_t)(4e9 * test_random(random)), 7, UINT32_MAX - 5};
+  float codes[COLOURS][MOST];
+  uint32_t pixels[MOST + 1];
+  fill(codes[0], COLOURS * MOST, 0, 1, random);
+  codes[0][0] = 1, codes[1][0] = 0;
+  pixels[count] = 9;
+  variant->paint((const float *const[COLOURS]){codes[0], codes[1], codes[2]}, start, count, pixels);
+  for (size_t c = 0; c < COLOURS; c++) {
+    variant->dither(codes[c], count, 255, start[c]);
+  }
+  for (size_t x = 0; x < count; x++) {
+    const long red = lround(255 * (double)codes[0][x]), green = lround(255 * (double)codes[1][x]);
+    assert_int_equal(pixels[x], red << 16 | green << 8 | lround(255 * (double)codes[2][x]));
+  }
+  assert_int_equal(pixels[count], 9);
+}
+
 static void variants_are_those_of_the_formula(void **state) {
   (void)state;
   for (size_t v = 0; clt_live_row_variants[v] != NULL; v++) {
     uint64_t random = 5;
     for (size_t count = 1; clt_live_row_variants[v]->runs_here() && count <= MOST; count++) {
       check_split(clt_live_row_variants[v], count, &random);
+      check_expand(clt_live_row_variants[v], count, &random);
       check_interpolate(clt_live_row_variants[v], count, &random);
       check_drive(clt_live_row_variants[v], count, &random);
       check_place(clt_live_row_variants[v], count, &random);
       check_dither(clt_live_row_variants[v], count, &random);
+      check_paint(clt_live_row_variants[v], count, &random);
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "device/live_kernels.h"
+#include "device/projector/codes.h"
 #include "device/projector/shaders.h"
 
 enum { N = CLT_PANEL_CHANNELS, TEXEL_CHANNELS = 4 };

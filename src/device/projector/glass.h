@@ -34,8 +34,4 @@ clt_status clt_glass_put_live(clt_glass *glass, const clt_live_picture *picture,
 /* Draws what was put last onto a window of width x height pixels, stretched where that is not the panel's size. */
 void clt_glass_draw(clt_glass *glass, int width, int height);
 
-/* codes[i] (0..1, clipped; NaN is 0) to the nearest of 0..full, halves upwards. */
-void clt_codes_to_bytes(const float *codes, size_t count, uint8_t *out);
-void clt_codes_to_words(const float *codes, size_t count, int full, uint16_t *out);
-
 #endif
