@@ -13,8 +13,7 @@
 
 enum {
   COLOURS = CLT_LIVE_COLOURS,
-  FIELDS = 2,    /* gain and offset */
-  PIECES = 1024, /* of a response */
+  FIELDS = 2, /* gain and offset */
   ROWS_AT_ONCE = 64,
   CHUNKS_AT_ONCE = 16,
   WORTH_SHARING = 1 << 16, /* codes that pay for waking threads */
@@ -30,7 +29,7 @@ typedef struct encoder {
   clt_light_table light_of;
   int32_t *cell; /* left of each column of the panel, */
   float *across; /* and how far the column is from it to the next one */
-  clt_live_piece table[COLOURS][PIECES + 1];
+  clt_live_piece table[COLOURS][CLT_LIVE_PIECES];
   float *codes;     /* what is wanted; NULL: */
   uint32_t *pixels; /* these are */
 } encoder;
@@ -152,7 +151,7 @@ static void encode_row(const encoder *self, int y, row_space *space) {
   float *own = unmix_row(self, space);
   for (size_t k = 0; k < (size_t)self->channels; k++) {
     float *to = self->codes != NULL ? self->codes + k * plane + row : own + k * width;
-    self->rows->place(own + k * width, PIECES, width, space->at, space->part);
+    self->rows->place(own + k * width, width, space->at, space->part);
     self->rows->interpolate(self->table[k], space->at, space->part, width, to);
     codes[k] = to;
     start[k] = dither_start(self->picture->seed) + (uint32_t)(k * plane + row);
@@ -190,7 +189,7 @@ static bool encode(encoder *self) {
     complete = open_space(self, &space);
 #pragma omp for schedule(static)
     for (int c = 0; c < self->channels; c++) {
-      clt_live_tabulate(&self->picture->panel.response[c], PIECES, self->table[c]);
+      clt_live_tabulate(&self->picture->panel.response[c], self->table[c]);
     }
 #pragma omp for schedule(dynamic, ROWS_AT_ONCE)
     for (int y = 0; y < self->height; y++) {

@@ -16,8 +16,8 @@ typedef struct clt_glass {
   clt_upload content;      /* sRGB codes */
   clt_upload gain, offset; /* on the grid, channels in R, G, B */
   clt_upload decode;       /* linear light of the 256 sRGB codes */
-  clt_upload encode;       /* codes 0..1 of the panel at light (i / (entries - 1))^2 in R, the step to the next in G;
-                            * a row for each channel */
+  clt_upload encode;       /* codes 0..1 of the panel where piece i of light begins (clt_live_tabulate) in R, the step
+                            * to the next in G; a row for each channel */
   clt_panel panel;         /* that encode is for */
   bool encode_known;
 } clt_glass;
