@@ -90,35 +90,41 @@ INLINE void place(const float *restrict light, size_t count, int32_t *restrict a
   }
 }
 
-/* A number in 0..1 for each counter: 32 bits, of which vectors are multiplied at once. The multipliers are those
- * that Wellons found to bias least. */
+/* A number in 1..2 for each counter: 32 bits, of which vectors are multiplied at once and the upper ones make the
+ * fraction. The multipliers are those that Wellons found to bias least. */
 INLINE float scatter(uint32_t key) {
   key = (key ^ (key >> 16)) * 0x7feb352du;
   key = (key ^ (key >> 15)) * 0x846ca68bu;
-  return (float)(int32_t)((key ^ (key >> 16)) >> 8) * 0x1p-24F;
-}
-
-INLINE int32_t step_of(float code, int32_t full, uint32_t key) {
-  const int32_t step = (int32_t)(code * (float)full + scatter(key));
-  return step < full ? step : full;
+  const uint32_t bits = key >> 9 | 0x3f800000;
+  float number;
+  memcpy(&number, &bits, sizeof number);
+  return number;
 }
 
 INLINE void dither(float *codes, size_t count, float full, uint32_t start) {
   for (size_t k = 0; k < count; k++) {
-    codes[k] = (float)step_of(codes[k], (int32_t)full, start + (uint32_t)k) / full;
+    const float step = (float)((int32_t)(codes[k] * full + scatter(start + (uint32_t)k)) - 1);
+    codes[k] = (step < full ? step : full) / full;
   }
+}
+
+/* A byte plus 1: what scatter brings along goes at once from all three. */
+enum { BYTE = 255 };
+
+INLINE int32_t byte_above(float code, uint32_t key) {
+  const int32_t step = (int32_t)(code * BYTE + scatter(key));
+  return step <= BYTE ? step : BYTE + 1;
 }
 
 INLINE void paint(const float *const codes[COLOURS], const uint32_t start[COLOURS], size_t count,
                   uint32_t *restrict pixels) {
-  enum { FULL = 255 };
   const float *restrict red = codes[0], *restrict green = codes[1], *restrict blue = codes[2];
   const uint32_t first = start[0], second = start[1], third = start[2];
   for (int32_t x = 0; x < (int32_t)count; x++) {
     const uint32_t key = (uint32_t)x;
-    const int32_t r = step_of(red[x], FULL, first + key), g = step_of(green[x], FULL, second + key),
-                  b = step_of(blue[x], FULL, third + key);
-    pixels[x] = (uint32_t)(r << 16 | g << 8 | b);
+    const int32_t r = byte_above(red[x], first + key), g = byte_above(green[x], second + key),
+                  b = byte_above(blue[x], third + key);
+    pixels[x] = (uint32_t)((r << 16) + (g << 8) + b - 0x010101);
   }
 }
 
