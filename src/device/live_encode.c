@@ -1,19 +1,19 @@
 /* What a projector that encodes by itself does, for those that cannot: on the processor, a row of the panel at a time.
  * Fields are interpolated across each row of cells once, then down between two of them. */
+#include "device/live_encode.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/memory.h"
 #include "base/random.h"
-#include "counterlight/device.h"
 #include "device/live_kernels.h"
 #include "image/cell_means.h"
 #include "image/light_kernels.h"
 
 enum {
   COLOURS = CLT_LIVE_COLOURS,
-  FIELDS = 2,    /* gain and offset */
-  PIECES = 1024, /* of a response */
+  FIELDS = 2, /* gain and offset */
   ROWS_AT_ONCE = 64,
   CHUNKS_AT_ONCE = 16,
   WORTH_SHARING = 1 << 16, /* codes that pay for waking threads */
@@ -29,8 +29,9 @@ typedef struct encoder {
   clt_light_table light_of;
   int32_t *cell; /* left of each column of the panel, */
   float *across; /* and how far the column is from it to the next one */
-  clt_live_piece table[COLOURS][PIECES + 1];
-  float *codes;
+  clt_live_piece table[COLOURS][CLT_LIVE_PIECES];
+  float *codes;     /* what is wanted; NULL: */
+  uint32_t *pixels; /* these are */
 } encoder;
 
 /* Workspace of a thread, for one row. */
@@ -38,10 +39,10 @@ typedef struct row_space {
   float *light, *drive; /* three channels of the row each */
   float *part;
   int32_t *at;
-  uint8_t *plane;        /* codes of the content, three channels */
-  clt_live_piece *piece; /* of a field along a row of cells */
-  float *field[2];       /* on two rows of cells: gain and offset of three channels along the panel */
-  int cells[2];          /* which rows these are, -1: none */
+  uint8_t *plane;  /* codes of the content, three channels */
+  float *own;      /* a field along a row of cells, and CLT_LIVE_PAD more */
+  float *field[2]; /* on two rows of cells: gain and offset of three channels along the panel */
+  int cells[2];    /* which rows these are, -1: none */
   void *memory;
 } row_space;
 
@@ -57,13 +58,9 @@ static void expand_fields(const encoder *self, int cells, const row_space *space
   const size_t grid = (size_t)picture->grid_width, plane = grid * (size_t)picture->grid_height;
   for (size_t k = 0; k < FIELDS * (size_t)self->channels; k++) {
     const float *whole = k % FIELDS == 0 ? picture->gain : picture->offset;
-    const float *own = whole + k / FIELDS * plane + (size_t)cells * grid;
-    for (size_t i = 0; i + 1 < grid; i++) {
-      space->piece[i] = (clt_live_piece){own[i], own[i + 1] - own[i]};
-    }
-    space->piece[grid - 1] = (clt_live_piece){own[grid - 1], 0};
-    self->rows->interpolate(space->piece, self->cell, self->across, (size_t)self->width,
-                            field + k * (size_t)self->width);
+    memcpy(space->own, whole + k / FIELDS * plane + (size_t)cells * grid, grid * sizeof *space->own);
+    space->own[grid] = space->own[grid - 1];
+    self->rows->expand(space->own, self->cell, self->across, (size_t)self->width, field + k * (size_t)self->width);
   }
 }
 
@@ -122,7 +119,7 @@ static void drive_row(const encoder *self, int y, row_space *space) {
 }
 
 /* Undoes crosstalk, clipped to 0..1: light takes the place of what the content was. */
-static const float *unmix_row(const encoder *self, const row_space *space) {
+static float *unmix_row(const encoder *self, const row_space *space) {
   const clt_panel *panel = &self->picture->panel;
   const size_t width = (size_t)self->width;
   const float *red = space->drive, *green = red + width, *blue = green + width;
@@ -141,20 +138,33 @@ static const float *unmix_row(const encoder *self, const row_space *space) {
   return space->light;
 }
 
+/* Of the numbers in 0..1 that dither a picture: the first one's counter. */
+static uint32_t dither_start(uint32_t seed) {
+  return (uint32_t)clt_random_scramble(seed + 1u);
+}
+
 static void encode_row(const encoder *self, int y, row_space *space) {
-  const size_t width = (size_t)self->width, plane = (size_t)self->height * width;
+  const size_t width = (size_t)self->width, plane = (size_t)self->height * width, row = (size_t)y * width;
+  const float *codes[COLOURS] = {0};
+  uint32_t start[COLOURS];
   drive_row(self, y, space);
-  const float *own = unmix_row(self, space);
+  float *own = unmix_row(self, space);
   for (size_t k = 0; k < (size_t)self->channels; k++) {
-    self->rows->place(own + k * width, PIECES, width, space->at, space->part);
-    self->rows->interpolate(self->table[k], space->at, space->part, width, self->codes + k * plane + (size_t)y * width);
+    float *to = self->codes != NULL ? self->codes + k * plane + row : own + k * width;
+    self->rows->place(own + k * width, width, space->at, space->part);
+    self->rows->interpolate(self->table[k], space->at, space->part, width, to);
+    codes[k] = to;
+    start[k] = dither_start(self->picture->seed) + (uint32_t)(k * plane + row);
+  }
+  if (self->pixels != NULL) {
+    self->rows->paint(codes, start, width, self->pixels + row);
   }
 }
 
 static bool open_space(const encoder *self, row_space *space) {
   enum { ROWS = 2 * COLOURS + 2 + 2 * COLOURS * FIELDS + 1 }; /* codes of three channels are within one of floats */
   const size_t width = (size_t)self->width;
-  float *next = clt_alloc(ROWS * width + 2 * (size_t)self->picture->grid_width, sizeof *next);
+  float *next = clt_alloc(ROWS * width + (size_t)self->picture->grid_width + CLT_LIVE_PAD, sizeof *next);
   *space = (row_space){.memory = next, .cells = {-1, -1}};
   if (next == NULL) {
     return false;
@@ -166,7 +176,7 @@ static bool open_space(const encoder *self, row_space *space) {
   space->plane = (uint8_t *)(space->part + 2 * width);
   space->field[0] = space->part + 3 * width;
   space->field[1] = space->field[0] + COLOURS * FIELDS * width;
-  space->piece = (clt_live_piece *)(space->field[1] + COLOURS * FIELDS * width);
+  space->own = space->field[1] + COLOURS * FIELDS * width;
   return true;
 }
 
@@ -179,7 +189,7 @@ static bool encode(encoder *self) {
     complete = open_space(self, &space);
 #pragma omp for schedule(static)
     for (int c = 0; c < self->channels; c++) {
-      clt_live_tabulate(&self->picture->panel.response[c], PIECES, self->table[c]);
+      clt_live_tabulate(&self->picture->panel.response[c], self->table[c]);
     }
 #pragma omp for schedule(dynamic, ROWS_AT_ONCE)
     for (int y = 0; y < self->height; y++) {
@@ -205,38 +215,44 @@ static clt_status fit_content(encoder *self, clt_error *error) {
                              : clt_fail(error, CLT_FAILED, "a moving picture: out of memory");
 }
 
-clt_status clt_live_encode(const clt_live_picture *picture, int channels, int height, int width, float *codes,
-                           clt_error *error) {
-  encoder self = {.picture = picture,
-                  .rows = clt_live_row_choose(),
-                  .codes_to_light = clt_light_choose(),
-                  .channels = channels,
-                  .height = height,
-                  .width = width,
-                  .codes = codes};
-  self.cell = clt_alloc((size_t)width, sizeof *self.cell);
-  self.across = clt_alloc((size_t)width, sizeof *self.across);
-  clt_status status = self.cell != NULL && self.across != NULL
-                          ? fit_content(&self, error)
+static clt_status run(encoder *self, clt_error *error) {
+  const size_t width = (size_t)self->width;
+  self->rows = clt_live_row_choose();
+  self->codes_to_light = clt_light_choose();
+  self->cell = clt_alloc(width, sizeof *self->cell);
+  self->across = clt_alloc(width, sizeof *self->across);
+  clt_status status = self->cell != NULL && self->across != NULL
+                          ? fit_content(self, error)
                           : clt_fail(error, CLT_FAILED, "a moving picture: out of memory");
   if (status == CLT_OK) {
-    for (int x = 0; x < width; x++) {
-      const double at = place(x, width, picture->grid_width);
-      self.cell[x] = (int32_t)at;
-      self.across[x] = (float)(at - self.cell[x]);
+    for (int x = 0; x < self->width; x++) {
+      const double at = place(x, self->width, self->picture->grid_width);
+      self->cell[x] = (int32_t)at;
+      self->across[x] = (float)(at - self->cell[x]);
     }
-    status = encode(&self) ? CLT_OK : clt_fail(error, CLT_FAILED, "a moving picture: out of memory");
+    status = encode(self) ? CLT_OK : clt_fail(error, CLT_FAILED, "a moving picture: out of memory");
   }
-  free(self.light);
-  free(self.cell);
-  free(self.across);
+  free(self->light);
+  free(self->cell);
+  free(self->across);
   return status;
+}
+
+clt_status clt_live_encode(const clt_live_picture *picture, int channels, int height, int width, float *codes,
+                           clt_error *error) {
+  encoder self = {.picture = picture, .channels = channels, .height = height, .width = width, .codes = codes};
+  return run(&self, error);
+}
+
+clt_status clt_live_paint(const clt_live_picture *picture, int height, int width, uint32_t *pixels, clt_error *error) {
+  encoder self = {.picture = picture, .channels = COLOURS, .height = height, .width = width, .pixels = pixels};
+  return run(&self, error);
 }
 
 void clt_live_dither(float *codes, size_t count, int bits, uint32_t seed) {
   const clt_live_row_kernels *rows = clt_live_row_choose();
   const float full = (float)((1 << bits) - 1);
-  const uint32_t start = (uint32_t)clt_random_scramble(seed + 1u);
+  const uint32_t start = dither_start(seed);
 #pragma omp parallel for schedule(dynamic, CHUNKS_AT_ONCE) if (count >= WORTH_SHARING)
   for (size_t k = 0; k < count; k += DITHERED) {
     rows->dither(codes + k, count - k < DITHERED ? count - k : DITHERED, full, start + (uint32_t)k);

@@ -18,6 +18,7 @@ WIDTH, HEIGHT = map(int, os.environ.get("CLT_FILM_SIZE", "640x360").split("x"))
 COLUMNS, ROWS = map(int, os.environ.get("CLT_FILM_GRID", "32x18").split("x"))
 RATE_HZ = int(os.environ.get("CLT_FILM_HZ", "30"))
 SANITIZED = os.environ["CLT_SANITIZED"] == "yes"
+LOOK_S = 0.007  # twice a refresh and more: looks take time from the processors that draw
 
 
 class Watcher(threading.Thread):
@@ -30,7 +31,7 @@ class Watcher(threading.Thread):
 
     def run(self):
         centres = [(2 * block + 1) * HEIGHT // (2 * film_numbers.BLOCKS) for block in range(film_numbers.BLOCKS)]
-        while not self.ending.wait(0.003):
+        while not self.ending.wait(LOOK_S):
             began = time.monotonic()
             strip = self.screen.green(WIDTH // 32, 0, 1, HEIGHT)
             self.seen.append((began, film_numbers.read_numbers(strip[centres, 0])))

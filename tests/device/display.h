@@ -63,6 +63,13 @@ static inline bool test_display_xvfb(const char *screen, test_display *display) 
   return test_display_start(arguments, display);
 }
 
+/* The same without memory that it shares with its clients. */
+static inline bool test_display_unshared(const char *screen, test_display *display) {
+  char *const arguments[] = {"Xvfb",      "-displayfd", "3",        "-screen",    "0",       (char *)(uintptr_t)screen,
+                             "-nolisten", "tcp",        "-noreset", "-extension", "MIT-SHM", NULL};
+  return test_display_start(arguments, display);
+}
+
 static inline void test_display_stop(test_display *display) {
   if (display->x != NULL) {
     XCloseDisplay(display->x);

@@ -1,4 +1,5 @@
-/* The projector on Xvfb: what stands on the glass is the pattern, read back by GL and from the screen. */
+/* The projector on Xvfb: what stands on the glass is the pattern, read back by GL and from the screen. There the
+ * processor paints by itself where the server shares memory; where it does not, and at 10 bits, GL draws. */
 #include "device/projector/glfw.h"
 
 #include <epoxy/gl.h>
@@ -55,15 +56,15 @@ static void assert_steps(const char *read_by, const uint16_t *got, const uint16_
   }
 }
 
-/* On a screen of that size and depth. */
-static void check_levels(int width, int height, int depth) {
+/* On a screen of that size and depth, drawn by GL or painted. */
+static void check_levels(int width, int height, int depth, bool drawn) {
   test_display display = {0};
   char screen[32];
   clt_error error = {0};
   clt_projector_info info;
   int64_t shown_ns = 0;
   snprintf(screen, sizeof screen, "%dx%dx%d", width, height, depth);
-  assert_true(test_display_xvfb(screen, &display));
+  assert_true(drawn ? test_display_unshared(screen, &display) : test_display_xvfb(screen, &display));
   clt_projector *projector = open_projector(0, 0, false);
   projector->driver->describe(projector, &info);
   assert_int_equal(info.width, width);
@@ -77,8 +78,10 @@ static void check_levels(int width, int height, int depth) {
   for (uint64_t seed = 1; seed <= 3; seed++) {
     draw_levels(width, height, (1 << info.bits) - 1, seed, codes, steps);
     assert_ok(projector->driver->present(projector, codes, &shown_ns, &error), error);
-    read_drawn(width, height, (1 << info.bits) - 1, got);
-    assert_steps("glReadPixels", got, steps, width, height);
+    if (drawn) {
+      read_drawn(width, height, (1 << info.bits) - 1, got);
+      assert_steps("glReadPixels", got, steps, width, height);
+    }
     test_display_grab(&display, 0, 0, width, height, got);
     assert_steps("XGetImage", got, steps, width, height);
   }
@@ -91,14 +94,16 @@ static void check_levels(int width, int height, int depth) {
 
 static void test_levels(void **state) {
   (void)state;
-  check_levels(1280, 800, 24);
-  check_levels(641, 359, 24);
-  check_levels(64, 48, 24);
+  for (int drawn = 0; drawn < 2; drawn++) {
+    check_levels(1280, 800, 24, drawn);
+    check_levels(641, 359, 24, drawn);
+    check_levels(64, 48, 24, drawn);
+  }
 }
 
 static void test_ten_bits(void **state) {
   (void)state;
-  check_levels(320, 200, 30);
+  check_levels(320, 200, 30, true);
 }
 
 /* A window on the desk has the size that was asked for, and its picture is as exact. */
@@ -232,7 +237,7 @@ static void test_live(void **state) {
   int64_t shown_ns;
   clt_live_picture picture = draw_live(5, content, gain, offset);
   assert_ok(clt_live_encode(&picture, 3, LIVE_HEIGHT, LIVE_WIDTH, codes, &error), error);
-  assert_true(test_display_xvfb("160x120x24", &display));
+  assert_true(test_display_unshared("160x120x24", &display));
   clt_projector *projector = open_projector(0, 0, false);
   for (picture.seed = 1; picture.seed <= SEEDS; picture.seed++) {
     assert_ok(projector->driver->present_live(projector, &picture, &shown_ns, &error), error);
@@ -264,7 +269,7 @@ static void test_stretched(void **state) {
   test_display display = {0};
   clt_error error = {0};
   int64_t shown_ns;
-  assert_true(test_display_xvfb("160x120x24", &display));
+  assert_true(test_display_unshared("160x120x24", &display));
   clt_projector *projector = open_projector(0, 0, false);
   for (uint32_t seed = 1; seed <= SEEDS; seed++) {
     clt_live_picture picture = draw_live(seed, content, gain, offset);
@@ -293,10 +298,84 @@ static long resident_kib(void) {
   return resident * (sysconf(_SC_PAGESIZE) / 1024);
 }
 
-/* Pictures of both kinds one after another hold no more memory at the end than early on. */
-static void test_memory(void **state) {
+/* Painted by the processor: every code is exactly what clt_live_encode and clt_live_dither make of it, also of content
+ * of another size. */
+static void test_painted(void **state) {
   (void)state;
-  enum { EARLY = 60, FRAMES = 360, GROWTH_KIB = 1024 };
+  enum { SEEDS = 12, PIXELS = LIVE_WIDTH * LIVE_HEIGHT };
+  static uint8_t content[LIVE_VALUES];
+  static float gain[3 * GRID_WIDTH * GRID_HEIGHT], offset[3 * GRID_WIDTH * GRID_HEIGHT], codes[LIVE_VALUES];
+  static uint16_t got[LIVE_VALUES];
+  test_display display = {0};
+  clt_error error = {0};
+  int64_t shown_ns;
+  assert_true(test_display_xvfb("160x120x24", &display));
+  clt_projector *projector = open_projector(0, 0, false);
+  for (uint32_t seed = 1; seed <= SEEDS; seed++) {
+    clt_live_picture picture = draw_live(seed, content, gain, offset);
+    picture.width = seed % 3 == 0 ? (int)(7 * seed) : LIVE_WIDTH;
+    picture.height = seed % 3 == 0 ? (int)(100 / seed) : LIVE_HEIGHT;
+    picture.seed = seed;
+    assert_ok(clt_live_encode(&picture, 3, LIVE_HEIGHT, LIVE_WIDTH, codes, &error), error);
+    clt_live_dither(codes, LIVE_VALUES, 8, seed);
+    assert_ok(projector->driver->present_live(projector, &picture, &shown_ns, &error), error);
+    test_display_grab(&display, 0, 0, LIVE_WIDTH, LIVE_HEIGHT, got);
+    for (int i = 0; i < LIVE_VALUES; i++) {
+      assert_near((double)got[i], 255 * (double)codes[i % 3 * PIXELS + i / 3], 1e-4);
+    }
+  }
+  projector->driver->close(projector);
+  test_display_stop(&display);
+}
+
+/* The only window on a screen of the test's own gets another size, as from a person at the desk. */
+static void resize_window(test_display *display, unsigned width, unsigned height) {
+  Window root, parent, *windows = NULL;
+  unsigned count = 0;
+  assert_true(XQueryTree(display->x, DefaultRootWindow(display->x), &root, &parent, &windows, &count));
+  XWindowAttributes about;
+  for (unsigned i = 0; i < count; i++) {
+    assert_true(XGetWindowAttributes(display->x, windows[i], &about));
+    if (about.map_state == IsViewable) {
+      XResizeWindow(display->x, windows[i], width, height);
+    }
+  }
+  XFree(windows);
+  XSync(display->x, False);
+}
+
+/* A window of another size than the panel is drawn by GL, which stretches, and painted again when it fits. */
+static void test_resized(void **state) {
+  (void)state;
+  enum { WIDTH = 200, HEIGHT = 120, VALUES = 3 * WIDTH * HEIGHT };
+  static const int sizes[][2] = {{WIDTH, HEIGHT}, {2 * WIDTH, 3 * HEIGHT}, {WIDTH, HEIGHT}};
+  static float codes[VALUES];
+  static uint16_t steps[VALUES], got[2 * 3 * VALUES];
+  test_display display = {0};
+  clt_error error = {0};
+  int64_t shown_ns;
+  assert_true(test_display_xvfb("800x600x24", &display));
+  clt_projector *projector = open_projector(WIDTH, HEIGHT, true);
+  for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++) {
+    const int width = sizes[k][0], height = sizes[k][1];
+    draw_levels(WIDTH, HEIGHT, 255, k, codes, steps);
+    resize_window(&display, (unsigned)width, (unsigned)height);
+    for (int repeat = 0; repeat < 3; repeat++) {
+      assert_ok(projector->driver->present(projector, codes, &shown_ns, &error), error);
+    }
+    test_display_grab(&display, 0, 0, width, height, got);
+    for (int i = 0; i < 3 * width * height; i++) {
+      const int x = i / 3 % width * WIDTH / width, y = i / 3 / width * HEIGHT / height;
+      assert_int_equal(got[i], steps[3 * (y * WIDTH + x) + i % 3]);
+    }
+  }
+  projector->driver->close(projector);
+  test_display_stop(&display);
+}
+
+/* Pictures of both kinds one after another hold no more memory at the end than early on. */
+static void check_memory(bool drawn, int frames) {
+  enum { EARLY = 60, GROWTH_KIB = 1024 };
   static uint8_t content[LIVE_VALUES];
   static float gain[3 * GRID_WIDTH * GRID_HEIGHT], offset[3 * GRID_WIDTH * GRID_HEIGHT], codes[LIVE_VALUES];
   test_display display = {0};
@@ -304,9 +383,9 @@ static void test_memory(void **state) {
   int64_t shown_ns;
   long early = 0;
   clt_live_picture picture = draw_live(6, content, gain, offset);
-  assert_true(test_display_xvfb("160x120x24", &display));
+  assert_true(drawn ? test_display_unshared("160x120x24", &display) : test_display_xvfb("160x120x24", &display));
   clt_projector *projector = open_projector(0, 0, false);
-  for (int frame = 0; frame < FRAMES; frame++) {
+  for (int frame = 0; frame < frames; frame++) {
     clt_status status = frame % 2 ? projector->driver->present_live(projector, &picture, &shown_ns, &error)
                                   : projector->driver->present(projector, codes, &shown_ns, &error);
     assert_ok(status, error);
@@ -315,6 +394,12 @@ static void test_memory(void **state) {
   assert_true(resident_kib() - early < GROWTH_KIB);
   projector->driver->close(projector);
   test_display_stop(&display);
+}
+
+static void test_memory(void **state) {
+  (void)state;
+  check_memory(true, 360);
+  check_memory(false, 200);
 }
 
 int main(void) {
@@ -327,6 +412,7 @@ int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_levels),    cmocka_unit_test(test_ten_bits),
                                      cmocka_unit_test(test_window),    cmocka_unit_test(test_pace),
                                      cmocka_unit_test(test_manners),   cmocka_unit_test(test_live),
-                                     cmocka_unit_test(test_stretched), cmocka_unit_test(test_memory)};
+                                     cmocka_unit_test(test_stretched), cmocka_unit_test(test_painted),
+                                     cmocka_unit_test(test_resized),   cmocka_unit_test(test_memory)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

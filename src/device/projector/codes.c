@@ -1,4 +1,4 @@
-#include "device/projector/glass.h"
+#include "device/projector/codes.h"
 
 /* Rounds half upwards: value - whole is exact, where value + 0.5 is not. Written so that compilers vectorise it. */
 static inline int nearest(float code, float full) {
@@ -17,5 +17,13 @@ void clt_codes_to_bytes(const float *codes, size_t count, uint8_t *out) {
 void clt_codes_to_words(const float *codes, size_t count, int full, uint16_t *out) {
   for (size_t i = 0; i < count; i++) {
     out[i] = (uint16_t)nearest(codes[i], (float)full);
+  }
+}
+
+void clt_codes_to_pixels(const float *codes, size_t count, uint32_t *out) {
+  const float *red = codes, *green = codes + count, *blue = codes + 2 * count;
+  for (size_t i = 0; i < count; i++) {
+    int r = nearest(red[i], 255.0F), g = nearest(green[i], 255.0F), b = nearest(blue[i], 255.0F);
+    out[i] = (uint32_t)(r << 16 | g << 8 | b);
   }
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "device/live_kernels.h"
+#include "device/projector/codes.h"
 #include "device/projector/shaders.h"
 
 enum { N = CLT_PANEL_CHANNELS, TEXEL_CHANNELS = 4 };
@@ -108,9 +109,9 @@ static clt_status fill_encode(clt_glass *glass, const clt_panel *panel, clt_erro
   if (glass->encode_known && memcmp(panel, &glass->panel, sizeof *panel) == 0) {
     return CLT_OK;
   }
-  clt_live_piece *table = clt_upload_begin(&glass->encode, CLT_SHADER_ENCODE, N, 1);
+  clt_live_piece *table = clt_upload_begin(&glass->encode, CLT_LIVE_PIECES, N, 1);
   for (int c = 0; c < N && table != NULL; c++) {
-    clt_live_tabulate(&panel->response[c], CLT_SHADER_ENCODE - 1, table + c * CLT_SHADER_ENCODE);
+    clt_live_tabulate(&panel->response[c], table + c * CLT_LIVE_PIECES);
   }
   glass->encode_known = table != NULL && clt_upload_end(&glass->encode);
   memcpy(&glass->panel, panel, sizeof *panel);

@@ -16,8 +16,8 @@ typedef struct clt_glass {
   clt_upload content;      /* sRGB codes */
   clt_upload gain, offset; /* on the grid, channels in R, G, B */
   clt_upload decode;       /* linear light of the 256 sRGB codes */
-  clt_upload encode;       /* codes 0..1 of the panel at light (i / (entries - 1))^2 in R, the step to the next in G;
-                            * a row for each channel */
+  clt_upload encode;       /* codes 0..1 of the panel where piece i of light begins (clt_live_tabulate) in R, the step
+                            * to the next in G; a row for each channel */
   clt_panel panel;         /* that encode is for */
   bool encode_known;
 } clt_glass;
@@ -33,9 +33,5 @@ clt_status clt_glass_put(clt_glass *glass, const float *codes, clt_error *error)
 clt_status clt_glass_put_live(clt_glass *glass, const clt_live_picture *picture, clt_error *error);
 /* Draws what was put last onto a window of width x height pixels, stretched where that is not the panel's size. */
 void clt_glass_draw(clt_glass *glass, int width, int height);
-
-/* codes[i] (0..1, clipped; NaN is 0) to the nearest of 0..full, halves upwards. */
-void clt_codes_to_bytes(const float *codes, size_t count, uint8_t *out);
-void clt_codes_to_words(const float *codes, size_t count, int full, uint16_t *out);
 
 #endif

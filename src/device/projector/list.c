@@ -13,7 +13,7 @@ static void keep(char *to, size_t size, const char *text) {
 }
 
 /* Mesa's and the kernel's drivers that draw with the processor. */
-static bool is_software(const char *renderer) {
+bool clt_glfw_is_software(const char *renderer) {
   static const char *const names[] = {"llvmpipe", "softpipe", "swrast", "Software Rasterizer"};
   for (size_t k = 0; k < sizeof names / sizeof names[0]; k++) {
     if (strstr(renderer, names[k]) != NULL) {
@@ -42,7 +42,7 @@ static void ask_renderer(clt_glfw_display *display) {
   keep(display->version, sizeof display->version, (const char *)glGetString(GL_VERSION));
   display->gl_major = epoxy_gl_version() / 10;
   display->gl_minor = epoxy_gl_version() % 10;
-  display->software = is_software(display->renderer);
+  display->software = clt_glfw_is_software(display->renderer);
   glfwMakeContextCurrent(NULL);
   glfwDestroyWindow(window);
 }

@@ -34,5 +34,7 @@ typedef struct clt_glfw_display {
  * display. */
 clt_status clt_glfw_list(const clt_projector_config *config, clt_glfw_display *display, clt_error *error);
 void clt_glfw_display_finish(clt_glfw_display *display);
+/* True for OpenGL's renderer (GL_RENDERER) where the processor draws. */
+bool clt_glfw_is_software(const char *renderer);
 
 #endif

@@ -52,15 +52,14 @@ const char clt_shader_codes[] =
   "              texelFetch(decode, ivec2(s.b, 0), 0).r);\n"                                                           \
   "}\n"
 
-/* The encoding is tabulated over the root of light, which takes the steepness out of it near black. Dither: code =
+/* The encoding is tabulated as clt_live_tabulate does it; 107 << 23 are the bits of 2^-20. Dither: code =
  * floor(value + r), r uniform in [0, 1), has the mean `value`; r is pcg3d of pixel and seed (Jarzynski & Olano, "Hash
  * Functions for GPU Rendering", JCGT 9, 2020). */
 #define SHOW                                                                                                           \
   "float encoded(float own, int c) {\n"                                                                                \
-  "  float at = sqrt(clamp(own, 0.0, 1.0)) * float(textureSize(encode, 0).x - 1);\n"                                   \
-  "  int low = int(at);\n"                                                                                             \
-  "  vec2 piece = texelFetch(encode, ivec2(low, c), 0).rg;\n"                                                          \
-  "  return piece.r + (at - float(low)) * piece.g;\n"                                                                  \
+  "  int at = floatBitsToInt(clamp(own, 0.0, 1.0) + 1.0 / 1048576.0) - (107 << 23);\n"                                 \
+  "  vec2 piece = texelFetch(encode, ivec2(at >> 17, c), 0).rg;\n"                                                     \
+  "  return piece.r + float(at & 131071) * (1.0 / 131072.0) * piece.g;\n"                                              \
   "}\n"                                                                                                                \
   "vec3 random(uvec3 v) {\n"                                                                                           \
   "  v = v * 1664525u + 1013904223u;\n"                                                                                \

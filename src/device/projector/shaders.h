@@ -6,7 +6,7 @@ extern const char clt_shader_vertices[], clt_shader_codes[];
 /* Moving pictures: of content that has the panel's size, and of any other, which is stretched over it. */
 extern const char clt_shader_live[], clt_shader_stretched[];
 
-/* Entries of the tables that they read. */
-enum { CLT_SHADER_DECODE = 256, CLT_SHADER_ENCODE = 4096 };
+/* Entries of the table of light. */
+enum { CLT_SHADER_DECODE = 256 };
 
 #endif

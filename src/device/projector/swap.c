@@ -75,8 +75,16 @@ static bool show_stamped(clt_swap *swap) {
   return false;
 }
 
-int64_t clt_swap_show(clt_swap *swap) {
-  int64_t began_ns, returned_ns = swap_buffers(swap, &began_ns);
+/* A canvas waits for nothing but the server. */
+static int64_t show_canvas(clt_canvas *canvas, int64_t *began_ns) {
+  *began_ns = clt_clock_ns();
+  clt_canvas_show(canvas);
+  return clt_clock_ns();
+}
+
+int64_t clt_swap_show(clt_swap *swap, clt_canvas *canvas) {
+  int64_t began_ns;
+  int64_t returned_ns = canvas != NULL ? show_canvas(canvas, &began_ns) : swap_buffers(swap, &began_ns);
   if (!show_stamped(swap)) {
     clt_pacing_swapped(&swap->pacing, began_ns, returned_ns);
     sleep_until(clt_pacing_release(&swap->pacing));
