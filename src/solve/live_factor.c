@@ -18,7 +18,7 @@ enum {
 /* Of a cell's own light: far light of smaller singular values is not coupled. */
 static const float COUPLED = 0.1f;
 
-/* factor' M other, M the moments of a weight. */
+/* factor' M other, M the moments of a weight. With the same side twice it is symmetric. */
 typedef struct product {
   int weight;
   bool factor_left, other_left; /* else right */
@@ -72,7 +72,22 @@ static bool has_changed(const clt_live_item *item, int weight, float change[CLT_
   return changed;
 }
 
-/* Brings sum = factor' M other up to date with the weights, over the first columns; column-major. */
+/* sum += plain' weighed, rows x columns each, rows of a term after each other; column-major. Of a symmetric one, whose
+ * upper half nobody reads, what lies above blocks on the diagonal is left out. */
+static void add_product(const float *plain, const float *weighed, size_t rows, size_t columns, bool symmetric,
+                        float *sum) {
+  enum { BLOCK = 48 };
+  const size_t step = symmetric ? BLOCK : columns;
+  for (size_t first = 0; first < columns && rows > 0; first += step) {
+    const size_t wide = columns - first < step ? columns - first : step;
+    cblas_sgemm(CblasColMajor, CblasNoTrans, CblasTrans, (blasint)(columns - first), (blasint)wide, (blasint)rows, 1,
+                plain + first, (blasint)columns, weighed + first, (blasint)columns, 1, sum + first * columns + first,
+                (blasint)columns);
+  }
+}
+
+/* Brings sum = factor' M other up to date with the weights, over the first columns; column-major. Of a symmetric
+ * product the lower half. */
 static void update_product(const clt_far *far, int channel, const product *of, size_t columns, float *room,
                            float *sum) {
   float *plain = room, *weighed = room + room_size(far) / 2, change[CLT_LIVE_MOMENTS];
@@ -88,9 +103,13 @@ static void update_product(const clt_far *far, int channel, const product *of, s
         }
       }
     }
-    cblas_sgemm(CblasColMajor, CblasNoTrans, CblasTrans, (blasint)columns, (blasint)columns, (blasint)rows, 1, plain,
-                (blasint)columns, weighed, (blasint)columns, 1, sum, (blasint)columns);
+    add_product(plain, weighed, rows, columns, of->factor_left == of->other_left, sum);
   }
+}
+
+/* An entry of a symmetric product. */
+static float lower_of(const float *sum, size_t columns, size_t i, size_t j) {
+  return i < j ? sum[i * columns + j] : sum[j * columns + i];
 }
 
 /* squares_r = side_r' M side_r, M the moments of v k / D. */
@@ -131,7 +150,11 @@ static clt_status prepare_channel(clt_far *far, int channel, clt_error *error) {
   for (size_t k = 0; k < far->hierarchy->leaves; k++) {
     far->kernels->weigh(far, &item[k]);
   }
-  update_product(far, channel, &H, far->rank, far->tall, far->gram + (size_t)channel * far->rank * far->rank);
+  float *gram = far->gram + (size_t)channel * far->rank * far->rank;
+  update_product(far, channel, &H, far->rank, far->tall, gram);
+  for (size_t at = 0; at < far->rank * far->rank; at++) {
+    gram[at] = lower_of(gram, far->rank, at % far->rank, at / far->rank);
+  }
   return choose_coupled(far, channel, error);
 }
 
@@ -221,8 +244,8 @@ static void lay_out(const clt_far *far, int channel, float *matrix) {
     for (size_t i = 0; i < count; i++) {
       const float entry = g[j * count + i] + (i == j ? 1.0f : 0.0f);
       matrix[j * order + i] = matrix[(count + i) * order + count + j] = entry;
-      matrix[(count + j) * order + i] = -h[j * count + i];
-      matrix[j * order + count + i] = n[j * count + i];
+      matrix[(count + j) * order + i] = -lower_of(h, count, i, j);
+      matrix[j * order + count + i] = lower_of(n, count, i, j);
     }
   }
 }
