@@ -69,7 +69,8 @@ static void expose(const void *state, clt_exposure *exposure, const clt_band *ba
   const clt_change_description *change = state;
   double since_s, share = find_share(change, band, &since_s);
   double left = change->left + floor(change->speed[0] * since_s), top = change->top + floor(change->speed[1] * since_s);
-  int first = (int)fmax(left, 0.0), last = (int)fmin(left + change->width, exposure->width);
+  int first = (int)fmin(fmax(left, 0.0), exposure->width);
+  int last = (int)fmin(fmax(left + change->width, 0.0), exposure->width);
   for (int c = 0; c < exposure->channels && share > 0.0; c++) {
     float factor = (float)(1.0 + share * (change->factor[c] - 1.0));
     for (int y = band->first; y < band->last; y++) {
