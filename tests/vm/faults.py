@@ -65,9 +65,9 @@ def check(there, exhibit):
     seen = [cycle(there, exhibit) for _ in range(CYCLES)]
     resets = exhibit.said().count("resetting it")
     assert resets > CYCLES, resets
-    # The first cycles are the first to have an earlier transport in memory as well, and another where the heap finds no
-    # place for it among what is freed (6.75 MiB each); from the third on nothing may grow.
-    settled, last = seen[2], seen[-1]
-    assert all(last[key] == settled[key] for key in ("descriptors", "mappings", "threads")), seen
-    assert last["rss_kib"] <= 1.01 * settled["rss_kib"], seen
+    # An earlier transport is in memory as well, and another where the heap finds no place for it among what is freed
+    # (6.75 MiB each): that comes and goes from cycle to cycle, the most of it may not grow.
+    half, last = CYCLES // 2, seen[-1]
+    assert all(last[key] == seen[2][key] for key in ("descriptors", "mappings", "threads")), seen
+    assert max(each["rss_kib"] for each in seen[half:]) <= 1.01 * max(each["rss_kib"] for each in seen[:half]), seen
     return {"after_faults": error, "resets": resets, "held": last}
