@@ -54,6 +54,8 @@ typedef struct clt_acquire_options {
   double patience_s; /* to wait for either, >= 0; 0 means 30. Then CLT_FAILED says where the room changed and by how
                         much, or the rig's own status says what is missing */
   bool recorded;     /* the devices are a recording: where it ends they are not waited for */
+  bool reopens;      /* the caller opens devices again: one that is gone or gives no frame is CLT_GONE or CLT_TIMEOUT at
+                        once, and the next acquisition goes on from the journal; only the room is waited for */
   /* Called after every pattern, and with phase "waiting" while a device is waited for; returning false cancels
    * (CLT_CANCELLED). May be NULL. */
   bool (*progress)(void *context, const clt_progress *progress);

@@ -27,8 +27,9 @@ typedef struct clt_calibrate_options {
   double timeout_s; /* for one frame; 0 means 2 */
   int attempts;     /* per frame; 0 means 3 */
   unsigned seed;    /* of the flashes that tell the latency */
-  /* Called before each phase ("latency", "photometry") and after each picture of "structured light"; false stops
-   * (CLT_CANCELLED). May be NULL. */
+  /* Called before "latency", "photometry" and "structured light" (done and total 0) and after each of their flashes,
+   * uniform fields and pictures; total is an estimate that may change. False stops (CLT_CANCELLED).
+   * May be NULL. */
   bool (*progress)(void *context, const char *phase, int done, int total);
   void *context;
 } clt_calibrate_options;

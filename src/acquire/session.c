@@ -71,10 +71,19 @@ static clt_status report(clt_session *session, const char *phase, clt_error *err
   return CLT_OK;
 }
 
-static clt_status observe_possible(clt_session *session, clt_error *error) {
+static long count_doubted(const clt_session *session) {
+  clt_rig_info now;
+  session->rig->operations->describe(session->rig, &now);
+  return now.doubted;
+}
+
+/* *moving: where it fails, it does so by what is seen, not by a device. */
+static clt_status observe_possible(clt_session *session, bool *moving, clt_error *error) {
   const clt_watch *watch = &session->watch;
+  const long doubted = count_doubted(session);
   clt_status status =
       session->rig->operations->observe(session->rig, &session->drive, &session->seen, &session->deviation, error);
+  *moving = status == CLT_OK || (status == CLT_TIMEOUT && count_doubted(session) > doubted);
   if (status != CLT_OK || !watch->ready) {
     return status;
   }
@@ -88,15 +97,23 @@ static clt_status observe_possible(clt_session *session, clt_error *error) {
                         100 * share);
 }
 
-/* By the rig, however often it takes: a device that does not answer, or is gone, may come back. */
+/* Whether trying again may help, and is not the caller's. */
+static bool is_worth_waiting(const clt_session *session, clt_status status, bool moving) {
+  const clt_acquire_options *options = &session->options;
+  const bool lasts = options->reopens ? !moving : status == CLT_GONE && options->recorded;
+  return session->watch.every > 0 && (status == CLT_TIMEOUT || status == CLT_GONE) && !lasts;
+}
+
+/* By the rig, however often it takes: a device that does not answer, or is gone, may come back, and who walks by is
+ * gone soon. */
 static clt_status observe_patiently(clt_session *session, clt_error *error) {
   clt_watch *watch = &session->watch;
   const int64_t started_ns = clt_clock_ns();
   double pause_s = PAUSE_FIRST_S;
   for (int tries = 1;; tries++) {
-    clt_status status = observe_possible(session, error);
-    bool over = status == CLT_GONE && session->options.recorded;
-    if (watch->every == 0 || over || (status != CLT_TIMEOUT && status != CLT_GONE)) {
+    bool moving = false;
+    clt_status status = observe_possible(session, &moving, error);
+    if (!is_worth_waiting(session, status, moving)) {
       return status;
     }
     watch->troubled = true;

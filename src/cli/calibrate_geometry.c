@@ -6,10 +6,7 @@
 
 static bool show_progress(void *context, int done, int total) {
   cli_calibrate *t = context;
-  char note[64];
-  snprintf(note, sizeof note, "picture %d of %d", done, total);
-  cli_progress_note(&t->progress, note);
-  return !cli_interrupted();
+  return cli_progress_count(&t->progress, "structured light", done, total);
 }
 
 static clt_status open_recording(cli_calibrate *t, clt_geometry_options *how, clt_error *error) {
@@ -46,5 +43,6 @@ clt_status cli_calibrate_geometry(cli_calibrate *t, clt_error *error) {
   }
   how.response = t->response;
   clt_shots_init(&shots, t->projector, t->camera, 0, 1, 1);
+  show_progress(t, 0, 0);
   return clt_geometry_measure(&shots, &how, &t->found.geometry, &t->found.findings, error);
 }

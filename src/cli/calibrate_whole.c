@@ -9,12 +9,7 @@
 
 static bool show_progress(void *context, const char *phase, int done, int total) {
   cli_calibrate *t = context;
-  char note[96];
-  if (total > 0) {
-    snprintf(note, sizeof note, "%s: picture %d of %d", phase, done, total);
-  }
-  cli_progress_note(&t->progress, total > 0 ? note : phase);
-  return !cli_interrupted();
+  return cli_progress_count(&t->progress, phase, done, total);
 }
 
 /* The devices that frames come from, and what the file says of them. */

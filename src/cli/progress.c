@@ -88,3 +88,15 @@ bool cli_progress_acquire(void *context, const clt_progress *state) {
   }
   return !cli_interrupted();
 }
+
+bool cli_progress_count(cli_progress *progress, const char *phase, int done, int total) {
+  if (done == 0) {
+    progress->phase_ns = clt_clock_ns();
+    cli_progress_note(progress, phase);
+    return !cli_interrupted();
+  }
+  const double seconds = clt_clock_since(progress->phase_ns);
+  const clt_progress state = {
+      .phase = phase, .done = done, .total = total, .seconds = seconds, .left = seconds * (total - done) / done};
+  return cli_progress_acquire(progress, &state);
+}

@@ -12,6 +12,7 @@ typedef struct cli_progress {
   bool shown;                 /* stderr is a terminal and the command is not quiet */
   bool drawn;                 /* a bar stands on the terminal's last line */
   int64_t drawn_ns;           /* when */
+  int64_t phase_ns;           /* when the phase began that is counted */
   struct sigaction before[2]; /* what SIGINT and SIGTERM did before */
 } cli_progress;
 
@@ -27,5 +28,8 @@ clt_status cli_check_interrupt(clt_error *error);
 void cli_progress_note(cli_progress *progress, const char *what);
 /* clt_acquire_options.progress, with a cli_progress as context: draws, and cancels when a signal came. */
 bool cli_progress_acquire(void *context, const clt_progress *state);
+/* Draws `done` of `total` of a phase, whose time counts from its first report, with done 0, on; false when a signal
+ * came. */
+bool cli_progress_count(cli_progress *progress, const char *phase, int done, int total);
 
 #endif

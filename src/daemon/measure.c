@@ -123,7 +123,7 @@ static clt_status calibrate(measurer *self, const measure_job *job, measure_resu
 static clt_status acquire(measurer *self, const measure_job *job, measure_result *result) {
   clt_acquire_options options = job->config.acquire;
   options.scheme = job->config.scheme[0] != '\0' ? job->config.scheme : NULL;
-  options.watch = options.watch < 0 ? 0 : options.watch; /* the daemon itself waits for devices */
+  options.reopens = true; /* as the state machine does, which says so meanwhile */
   char belongs[1024];
   resume_describe(job, self->station, belongs, sizeof belongs);
   options.journal = job->journal[0] != '\0' ? job->journal : NULL;

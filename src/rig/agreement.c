@@ -50,7 +50,7 @@ static void read_rates(const clt_agreement *agreement, const clt_merge *merge, i
     bool whole = sums[i].count > 0;
     double e = (whole ? (double)sums[i].light : (double)merge->light[(int)(sums[i].raw + 0.5f)]) / t;
     rate[i] = seen ? (float)e : NAN;
-    variance[i] = whole ? (float)clt_merge_variance(merge, &sums[i], t, e) : -1;
+    variance[i] = whole ? (float)clt_merge_noise(merge, &sums[i], t, e) : -1;
     bias[i] = whole ? (float)clt_merge_bias(merge, &sums[i], t, e) : 0;
   }
 }

@@ -15,27 +15,26 @@
 /* A calibration under way. */
 typedef struct measuring {
   clt_calibrate_options options;
+  const char *phase;
   clt_shots shots;
   clt_photometry photometry;
   clt_geometry geometry;
   clt_calibration *made;
 } measuring;
 
-static clt_status begin_phase(const measuring *m, const char *phase, clt_error *error) {
-  const clt_calibrate_options *options = &m->options;
-  return options->progress == NULL || options->progress(options->context, phase, 0, 0)
-             ? CLT_OK
-             : clt_fail(error, CLT_CANCELLED, "the calibration was stopped before its %s", phase);
+static bool report(void *context, int done, int total) {
+  const measuring *m = context;
+  return m->options.progress == NULL || m->options.progress(m->options.context, m->phase, done, total);
 }
 
-static bool count_pictures(void *context, int done, int total) {
-  const clt_calibrate_options *options = &((const measuring *)context)->options;
-  return options->progress == NULL || options->progress(options->context, "structured light", done, total);
+static clt_status begin_phase(measuring *m, const char *phase, clt_error *error) {
+  m->phase = phase;
+  return report(m, 0, 0) ? CLT_OK : clt_fail(error, CLT_CANCELLED, "the calibration was stopped before its %s", phase);
 }
 
 /* By an exposure that does not saturate, of at most a frame. */
 static clt_status measure_latency(measuring *m, clt_error *error) {
-  clt_calibration_report *report = m->made->report;
+  clt_latency *latency = &m->made->report->latency;
   clt_field_bench bench = {0};
   double seconds = 0;
   clt_findings ignored = {0}; /* photometry says them again */
@@ -46,20 +45,24 @@ static clt_status measure_latency(measuring *m, clt_error *error) {
   if (status != CLT_OK) {
     return status;
   }
-  const clt_latency_options how = {.exposure_s = fmin(seconds, m->shots.sensor.frame_s), .seed = m->options.seed};
-  status = clt_latency_measure(&m->shots, &how, &report->latency, &m->made->findings, error);
-  m->shots.latency_s = status == CLT_OK ? report->latency.complete_s : m->shots.latency_s;
+  const clt_latency_options how = {
+      .exposure_s = fmin(seconds, m->shots.sensor.frame_s), .seed = m->options.seed, .progress = report, .context = m};
+  status = clt_latency_measure(&m->shots, &how, latency, &m->made->findings, error);
+  m->shots.latency_s = status == CLT_OK ? latency->complete_s : m->shots.latency_s;
   return status;
 }
 
 static clt_status measure_photometry(measuring *m, clt_error *error) {
-  const clt_photometry_options how = {
-      .levels = m->options.levels, .frames = m->options.frames, .watch_s = m->options.watch_s};
-  clt_photometry_report *report = &m->made->report->photometry;
+  const clt_photometry_options how = {.levels = m->options.levels,
+                                      .frames = m->options.frames,
+                                      .watch_s = m->options.watch_s,
+                                      .progress = report,
+                                      .context = m};
+  clt_photometry_report *found = &m->made->report->photometry;
   clt_status status = begin_phase(m, "photometry", error);
-  status = status == CLT_OK ? clt_photometry_measure(&m->shots, &how, &m->photometry, report, error) : status;
-  for (int k = 0; k < report->findings.count; k++) {
-    clt_findings_add(&m->made->findings, report->findings.item[k].serious, "%s", report->findings.item[k].text);
+  status = status == CLT_OK ? clt_photometry_measure(&m->shots, &how, &m->photometry, found, error) : status;
+  for (int k = 0; k < found->findings.count; k++) {
+    clt_findings_add(&m->made->findings, found->findings.item[k].serious, "%s", found->findings.item[k].text);
   }
   if (status == CLT_OK) {
     clt_shots_calibrate(&m->shots, m->photometry.black_level, m->photometry.full_well, m->photometry.read_noise);
@@ -70,9 +73,10 @@ static clt_status measure_photometry(measuring *m, clt_error *error) {
 static clt_status measure_geometry(measuring *m, clt_error *error) {
   clt_geometry_options how = {.exposure_s = m->made->report->photometry.base_s,
                               .response = m->photometry.camera,
-                              .progress = count_pictures,
+                              .progress = report,
                               .context = m};
-  clt_status status = clt_gray_init(&how.gray, m->shots.panel.width, m->shots.panel.height, error);
+  clt_status status = begin_phase(m, "structured light", error);
+  status = status == CLT_OK ? clt_gray_init(&how.gray, m->shots.panel.width, m->shots.panel.height, error) : status;
   return status == CLT_OK ? clt_geometry_measure(&m->shots, &how, &m->geometry, &m->made->findings, error) : status;
 }
 

@@ -14,15 +14,26 @@
 #define DEVIATIONS 6            /* that two exposures must lie apart for one to be dead */
 enum { WORTH_SHARING = 32768 }; /* values from which threads pay */
 
+/* h at a code value that need not be whole. */
+static double light_at(const clt_merge *merge, double code) {
+  int top = (1 << merge->camera.bits) - 1;
+  double at = fmin(fmax(code, 0), top);
+  int low = at < top ? (int)at : top - 1;
+  return (double)merge->light[low] + (at - low) * ((double)merge->light[low + 1] - (double)merge->light[low]);
+}
+
 static void fill_tables(clt_merge *merge, const clt_curve *response) {
   int top = (1 << merge->camera.bits) - 1;
-  double black = merge->camera.black_level, range = top - black, step = 1 / range;
+  double black = merge->camera.black_level, range = top - black, half = 0.5 * fmax(merge->camera.step, 1);
   for (int code = 0; code <= top; code++) {
     double v = (code - black) / range;
     /* The odd continuation below black keeps noise around zero unbiased. */
     merge->light[code] = (float)(v < 0 ? -clt_curve_decode(response, -v) : clt_curve_decode(response, v));
-    double low = fmax(fabs(v) - step, 0), high = fmin(fabs(v) + step, 1);
-    merge->slope[code] = (float)((clt_curve_decode(response, high) - clt_curve_decode(response, low)) / (high - low));
+  }
+  for (int code = 0; code <= top; code++) {
+    double up = light_at(merge, code + half) - light_at(merge, code);
+    double down = light_at(merge, code) - light_at(merge, code - half);
+    merge->step[code] = (float)(2 * fmax(up, down)); /* at the ends of the scale one of them is cut short */
   }
   merge->saturated = (float)(black + SAMPLE_LIMIT * range);
   merge->full = (float)(black + MEAN_LIMIT * range);
@@ -36,9 +47,9 @@ clt_status clt_merge_init(clt_merge *merge, const clt_camera_info *camera, const
       .footprints = footprints,
       .exposures = exposures,
       .light = clt_alloc(codes, sizeof *merge->light),
-      .slope = clt_alloc(codes, sizeof *merge->slope),
+      .step = clt_alloc(codes, sizeof *merge->step),
       .sums = clt_alloc((size_t)exposures * (size_t)camera->channels * footprints->cells, sizeof *merge->sums)};
-  if (merge->light == NULL || merge->slope == NULL || merge->sums == NULL) {
+  if (merge->light == NULL || merge->step == NULL || merge->sums == NULL) {
     clt_merge_finish(merge);
     return clt_fail(error, CLT_FAILED, "out of memory for merging %d exposures of %zu cells", exposures,
                     footprints->cells);
@@ -49,7 +60,7 @@ clt_status clt_merge_init(clt_merge *merge, const clt_camera_info *camera, const
 
 void clt_merge_finish(clt_merge *merge) {
   free(merge->light);
-  free(merge->slope);
+  free(merge->step);
   free(merge->sums);
   *merge = (clt_merge){0};
 }
@@ -97,27 +108,41 @@ void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame) {
   }
 }
 
-double clt_merge_variance(const clt_merge *merge, const clt_merge_sum *sum, double t, double e) {
-  const clt_camera_info *camera = &merge->camera;
-  double read = camera->read_noise / camera->full_well;
-  double step = merge->slope[(int)(sum->raw + 0.5f)] / ((1 << camera->bits) - 1 - camera->black_level);
-  double sample = fmax(e, 0) * t / camera->full_well + read * read + step * step / 12;
-  return sample / (t * t * sum->count);
+/* Noise of variance r2 steps squared leaves sum over k of (-1)^k sin(2 pi k x) exp(-2 pi^2 k^2 r2) / (pi k) steps of
+ * the rounding of x; its mean square over all x is S(4 pi^2 r2) / (2 pi^2), S(a) = sum exp(-a k^2) / k^2, which for
+ * small a is pi^2 / 6 - sqrt(pi a) + a / 2 (by S' and the theta function). 1/12 without noise. */
+static double shared_rounding(double r2) {
+  double a = 4 * M_PI * M_PI * r2;
+  if (a > 20) {
+    return 0;
+  }
+  double sum = a < 1.5 ? M_PI * M_PI / 6 - sqrt(M_PI * a) + a / 2 : exp(-a) + exp(-4 * a) / 4;
+  return sum / (2 * M_PI * M_PI);
 }
 
-/* h at a code value that need not be whole. */
-static double light_at(const clt_merge *merge, double code) {
-  int top = (1 << merge->camera.bits) - 1;
-  double at = fmin(fmax(code, 0), top);
-  int low = at < top ? (int)at : top - 1;
-  return (double)merge->light[low] + (at - low) * ((double)merge->light[low + 1] - (double)merge->light[low]);
+/* Variances of h: of one sample by itself, and of what all samples of the cell share. */
+static double sample_variance(const clt_merge *merge, const clt_merge_sum *sum, double light, double *shared) {
+  const clt_camera_info *camera = &merge->camera;
+  double read = camera->read_noise / camera->full_well, step = (double)merge->step[(int)(sum->raw + 0.5f)];
+  double noise = fmax(light, 0) / camera->full_well + read * read, squared = step * step;
+  *shared = squared > 0 ? squared * shared_rounding(noise / squared) : 0;
+  return noise + squared / 12 - *shared;
+}
+
+double clt_merge_noise(const clt_merge *merge, const clt_merge_sum *sum, double t, double e) {
+  double shared = 0, own = sample_variance(merge, sum, e * t, &shared);
+  return own / (t * t * (double)sum->count);
+}
+
+double clt_merge_variance(const clt_merge *merge, const clt_merge_sum *sum, double t, double e) {
+  double shared = 0, own = sample_variance(merge, sum, e * t, &shared);
+  return (own / (double)sum->count + shared) / (t * t);
 }
 
 /* What rounding to the camera's steps shifts the mean of samples at a code value, noise in units of h. */
 static double rounding(const clt_merge *merge, double code, double noise) {
-  double half = light_at(merge, code + 0.5 * fmax(merge->camera.step, 1)) - light_at(merge, code);
-  double steps = noise / fmax(2 * half, 1e-12);
-  return half * exp(-2 * M_PI * M_PI * steps * steps);
+  double step = (double)merge->step[(int)(code + 0.5)], steps = noise / fmax(step, 1e-12);
+  return 0.5 * step * exp(-2 * M_PI * M_PI * steps * steps);
 }
 
 /* What noise gains that is cut off at the end of the scale, for any light that may have come out as this mean: the gain

@@ -3,9 +3,10 @@
  * With v = (sample - black level) / (full scale - black level) and h = decode(v) the fraction of full scale that light
  * reached, a sample taken for t seconds estimates the rate e = responsivity * radiance by h / t. Its variance is
  *   (e t / W + (s_r / W)^2 + (h'(v) q)^2 / 12) / t^2
- * (photons, reading, quantisation; W full well in electrons, s_r read noise in electrons, q one code value as a step of
- * v), evaluated at the merged e and not at the sample, so that a dark fluctuation gets no more weight than a bright one
- * (Granados et al. 2010). Saturated exposures are left out, and so are dead ones, dark where two others show light. */
+ * (photons, reading, quantisation; W full well in electrons, s_r read noise in electrons, q a step of the camera as one
+ * of v), evaluated at the merged e and not at the sample, so that a dark fluctuation gets no more weight than a bright
+ * one (Granados et al. 2010). Saturated exposures are left out, and so are dead ones, dark where two others show light.
+ */
 #ifndef CLT_RIG_MERGE_H
 #define CLT_RIG_MERGE_H
 
@@ -29,7 +30,7 @@ typedef struct clt_merge {
   int exposures;
   double seconds[CLT_EXPOSURES_MAX]; /* what the frames really had */
   float *light;                      /* h of every code value */
-  float *slope;                      /* dh/dv of every code value */
+  float *step;                       /* of the camera at every code value, in h */
   float saturated;                   /* least code value that is left out */
   float full;                        /* an exposure is left out for a cell whose mean code value reaches this */
   clt_merge_sum *sums;               /* [(exposure * channels + c) * cells + i] */
@@ -46,8 +47,11 @@ void clt_merge_add(clt_merge *merge, int exposure, const clt_frame *frame);
  * the largest that the exposures prove (0 where the cell is not seen). */
 void clt_merge_radiance(const clt_merge *merge, clt_image *radiance, clt_image *deviation);
 
-/* Variance of the rate that one exposure of t seconds gives a value, were the rate e. */
+/* Variance of the rate that one exposure of t seconds gives a value, were the rate e, over lights alike: noise, and
+ * rounding that the samples share where noise is too small to dither it. */
 double clt_merge_variance(const clt_merge *merge, const clt_merge_sum *sum, double t, double e);
+/* The part of it that is less the more samples there are. */
+double clt_merge_noise(const clt_merge *merge, const clt_merge_sum *sum, double t, double e);
 /* The most by which that rate is off for a reason that all samples of the cell share, so that their number is no help:
  * rounding to steps of the camera, which noise of s steps dithers to at most exp(-2 pi^2 s^2) / 2 steps (Widrow and
  * Kollar, Quantization Noise, 2008), in the sample and in the black level; and noise that is cut off at code 0, whose

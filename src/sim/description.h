@@ -70,7 +70,8 @@ typedef struct clt_vibration_description {
 } clt_vibration_description;
 
 typedef struct clt_change_description {
-  double at_s;                  /* of the scene's clock */
+  double at_s, for_s, every_s;  /* of the scene's clock; for_s 0: it stays; every_s 0: once */
+  double speed[2];              /* cells a second to the right and down */
   int left, top, width, height; /* cells */
   double factor[CLT_SIM_CHANNELS_MAX];
 } clt_change_description;

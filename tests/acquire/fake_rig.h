@@ -28,6 +28,7 @@ typedef struct fake_rig {
   long dies_at;          /* kill -9 of the process before that pattern; 0: never */
   clt_status fails_with; /* from pattern fails_at on */
   long fails_at;
+  bool moving; /* it fails because exposures contradict each other */
 } fake_rig;
 
 static inline void fake_describe(const clt_rig *base, clt_rig_info *info) {
@@ -67,6 +68,7 @@ static inline clt_status fake_observe(clt_rig *base, const clt_image *drive, clt
   }
   if (++rig->patterns >= rig->fails_at && rig->fails_with != CLT_OK) {
     free(lit);
+    rig->doubted += rig->moving;
     return clt_fail(error, rig->fails_with, "the fake is told to fail");
   }
   for (int c = 0; c < rig->channels; c++) {

@@ -244,6 +244,35 @@ static void looks_are_made_when_they_are_due(void **state) {
   free(exact);
 }
 
+/* A caller that opens devices again hears of them at once; what moves in the room is waited for all the same. */
+static void devices_are_left_to_a_caller_that_opens_them_again(void **state) {
+  (void)state;
+  enum { GOOD = 40 };
+  double *exact = dihedral_transport(ROOM_WIDTH, ROOM_HEIGHT, 0.7);
+  const struct {
+    clt_status status;
+    bool moving, reopens, tried_once;
+  } cases[] = {{CLT_GONE, false, true, true},
+               {CLT_TIMEOUT, false, true, true},
+               {CLT_TIMEOUT, true, true, false},
+               {CLT_GONE, false, false, false},
+               {CLT_TIMEOUT, false, false, false}};
+  for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+    fake_rig rig = fake_rig_make(ROOM_WIDTH, ROOM_HEIGHT, 1, exact, 1);
+    rig.fails_with = cases[n].status;
+    rig.moving = cases[n].moving;
+    rig.fails_at = GOOD + 1;
+    const clt_acquire_options options = {
+        .scheme = "brute", .watch = -1, .patience_s = 0.05, .reopens = cases[n].reopens};
+    clt_transport *transport = NULL;
+    clt_error error = {0};
+    assert_int_equal(clt_acquire(&rig.base, &options, &transport, &error), cases[n].status);
+    assert_int_equal(rig.patterns == GOOD + 1, cases[n].tried_once);
+    assert_int_equal(strstr(error.message, "tried ") == NULL, cases[n].tried_once);
+  }
+  free(exact);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(noise_is_no_change_and_a_dark_tile_is),
@@ -251,6 +280,7 @@ int main(void) {
       cmocka_unit_test(the_journal_goes_back),
       cmocka_unit_test(a_lamp_that_drifts_is_scaled_out),
       cmocka_unit_test(looks_are_made_when_they_are_due),
+      cmocka_unit_test(devices_are_left_to_a_caller_that_opens_them_again),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

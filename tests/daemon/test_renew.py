@@ -12,6 +12,8 @@ def reacquire(run, scope):
         assert client.ask("reacquire", scope=scope)["state"] == "acquiring"
         notes = client.until("showing", "holding")
     found = [n["params"] for n in notes if n["method"] == "reacquired"]
+    made = [n["params"] for n in notes if n["method"] == "progress"]
+    assert made and made[0]["phase"] == "black" and made[0]["total"] == (8 if scope == "photometry" else 10), made
     status = run.status()
     assert status["state"] == "showing" and found == [status["reacquired"]], (found, status)
     print(scope, found[0])

@@ -12,6 +12,7 @@ from exhibit import exhibit, main, wait_for
 ROOM = "camera = {{ faults = {{ gone_at_s = {at}; gone_s = 0.6; }}; }};\n"
 CONFIRM = 1 + 4 + 1  # white, black, a random picture
 FIRST = 1 + 24 + 24  # a random picture, black, white
+LOOKS = 4  # at a sum and white after the interruption, and those after it fall elsewhere
 
 
 def prepare(run, fault="", daemon="retry_s = [0.05, 0.2];"):
@@ -62,7 +63,7 @@ def assert_resumed(run, before, known):
     seen, patterns, plan = measured(run)
     resumed = int(plan.split("; ")[-1].split(" ")[0]) if "interruption" in plan else 0
     print(f"{resumed} of {patterns} patterns from before; off by {off(seen, transport):.3%}, by noise {noise:.3%}")
-    assert resumed >= before and patterns == whole + CONFIRM, (plan, before, patterns, whole)
+    assert resumed >= before and 0 <= patterns - whole - CONFIRM <= LOOKS, (plan, before, patterns, whole)
     assert patterns - resumed < whole - FIRST
     assert off(seen, transport) < noise, (off(seen, transport), noise)
     assert not (run.state / "acquisition.journal").exists()

@@ -25,11 +25,40 @@ static void open_room(rough_room *room, unsigned seed) {
   rough_open_text(room, text);
 }
 
+/* What the progress said: of each phase the first estimate, and the last count. */
+typedef struct witness {
+  int phases, first_total[4], last_done[4], last_total[4];
+} witness;
+
+static bool bear_witness(void *context, const char *phase, int done, int total) {
+  static const char *const phases[] = {"latency", "photometry", "structured light"};
+  witness *self = context;
+  if (done == 0) {
+    assert_true(total == 0 && self->phases < 3);
+    self->phases++;
+    return true;
+  }
+  const int at = self->phases - 1;
+  assert_string_equal(phase, phases[at]);
+  assert_true(done == self->last_done[at] + 1 && done <= total);
+  self->first_total[at] = done == 1 ? total : self->first_total[at];
+  self->last_done[at] = done;
+  self->last_total[at] = total;
+  return true;
+}
+
 static clt_calibration *calibrate(const rough_room *room) {
   clt_calibration *made = NULL;
   clt_error error = {0};
-  const clt_calibrate_options options = {.watch_s = 4, .timeout_s = 5};
+  witness seen = {.phases = 0};
+  const clt_calibrate_options options = {.watch_s = 4, .timeout_s = 5, .progress = bear_witness, .context = &seen};
   assert_ok(clt_calibrate(room->projector, room->camera, &options, "a rough room", &made, &error), error);
+  assert_int_equal(seen.phases, 3);
+  for (int k = 0; k < 3; k++) {
+    printf("%d of %d, at first %d; ", seen.last_done[k], seen.last_total[k], seen.first_total[k]);
+    assert_true(seen.last_total[k] - seen.last_done[k] <= 5);
+    assert_near(seen.first_total[k], seen.last_done[k], 0.25 * seen.last_done[k]);
+  }
   return made;
 }
 

@@ -100,10 +100,31 @@ static void rough_rooms_are_measured_by_faulty_cameras(void **state) {
   measure(4, &cases[1], "faults = { dropped = 0.03; stuck = 0.03; torn = 0.03; };");
 }
 
+static bool stop_at_seven(void *context, int done, int total) {
+  *(int *)context = done;
+  return done < 7 && total > 100;
+}
+
+static void it_stops_where_it_is_told_to(void **state) {
+  (void)state;
+  rough_room room;
+  int fields = 0;
+  clt_photometry found;
+  clt_photometry_report report;
+  clt_error error = {0};
+  const clt_photometry_options options = {.progress = stop_at_seven, .context = &fields};
+  rough_open(&room, 1, (rough_settings){"latency_ms = 37; " ROUGH_PANEL, "", ROUGH_LIGHT});
+  assert_int_equal(clt_photometry_measure(&room.shots, &options, &found, &report, &error), CLT_CANCELLED);
+  assert_string_equal(error.message, "photometry was stopped after 7 fields");
+  assert_int_equal(fields, 7);
+  rough_close(&room);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(rough_rooms_are_measured),
       cmocka_unit_test(rough_rooms_are_measured_by_faulty_cameras),
+      cmocka_unit_test(it_stops_where_it_is_told_to),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

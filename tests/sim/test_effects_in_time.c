@@ -233,6 +233,41 @@ static void change_repaints_cells(void **state) {
   pair_close(&pair);
 }
 
+/* Something passes again and again: each exposure sees it where it is in its middle, for the part that it is there. */
+static void what_passes_by_comes_and_goes(void **state) {
+  (void)state;
+  rig_pair pair = wide_open("", "",
+                            "ambient = 0.125; change = { at_s = 0.2; for_s = 0.15; every_s = 0.4; cells = [0, 1, 2, "
+                            "2]; speed = [40.0, -10.0]; factor = 0.5; };");
+  float codes[WIDE_VALUES];
+  double radiance[WIDE_VALUES];
+  wide_codes(codes);
+  wide_radiance(codes, radiance);
+  int64_t settled = pair_show(&pair, codes) + WIDE_SETTLED;
+  int there = 0, partly = 0, gone = 0, moved = 0;
+  for (int n = 0; n < 60; n++) {
+    clt_frame frame = pair_frame(&pair, settled);
+    double a = 1e-9 * (double)frame.exposed_ns, b = a + frame.exposure_s, share = 0, since = 0;
+    for (int k = 0; k < 20; k++) {
+      double start = 0.2 + 0.4 * k, overlap = fmin(b, start + 0.15) - fmax(a, start);
+      since = overlap > 0 ? fmax((a + b) / 2 - start, 0) : since;
+      share += fmax(overlap, 0) / (b - a);
+    }
+    int left = (int)floor(40 * since), top = 1 + (int)floor(-10 * since);
+    there += share >= 1;
+    partly += share > 0 && share < 1;
+    gone += share <= 0;
+    moved += share > 0 && left > 0;
+    for (int k = 0; k < WIDE_VALUES; k++) {
+      int x = k % WIDE_WIDTH, y = k % WIDE_CELLS / WIDE_WIDTH;
+      bool covered = x >= left && x < left + 2 && y >= top && y < top + 2;
+      assert_near(wide_seen(&frame, k), (covered ? 1 - 0.5 * share : 1) * (0.125 + radiance[k]), 4e-5);
+    }
+  }
+  assert_true(there > 5 && partly > 2 && gone > 5 && moved > 5);
+  pair_close(&pair);
+}
+
 static clt_status ask(rig_pair *pair, int64_t not_before_ns) {
   clt_frame frame;
   return pair->camera->driver->next(pair->camera, not_before_ns, 1e3, &frame, NULL);
@@ -267,17 +302,12 @@ static void an_unplugged_camera_must_be_opened_again(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(flicker_is_integrated),
-      cmocka_unit_test(drift_dims_the_lamp),
-      cmocka_unit_test(rows_follow_each_other),
-      cmocka_unit_test(faults_by_chance),
-      cmocka_unit_test(torn_frames_are_dark_below),
-      cmocka_unit_test(latency_varies_by_chance),
-      cmocka_unit_test(stuck_frames_repeat),
-      cmocka_unit_test(late_frames_move_the_clock),
-      cmocka_unit_test(vibration_shifts_slopes),
-      cmocka_unit_test(change_repaints_cells),
-      cmocka_unit_test(an_unplugged_camera_must_be_opened_again),
+      cmocka_unit_test(flicker_is_integrated),         cmocka_unit_test(drift_dims_the_lamp),
+      cmocka_unit_test(rows_follow_each_other),        cmocka_unit_test(faults_by_chance),
+      cmocka_unit_test(torn_frames_are_dark_below),    cmocka_unit_test(latency_varies_by_chance),
+      cmocka_unit_test(stuck_frames_repeat),           cmocka_unit_test(late_frames_move_the_clock),
+      cmocka_unit_test(vibration_shifts_slopes),       cmocka_unit_test(change_repaints_cells),
+      cmocka_unit_test(what_passes_by_comes_and_goes), cmocka_unit_test(an_unplugged_camera_must_be_opened_again),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -57,6 +57,7 @@ static const refusal refusals[] = {
     {GRID "vibration = { amplitude = [1.0, 3.0]; }; " WHITE WALL, "amplitude", "legal is -2 to 2"},
     {GRID "change = { at_s = 1.0; factor = 0.5; }; " WHITE WALL, "cells", "needs cells"},
     {GRID "change = { cells = [2, 0, 3, 1]; factor = 0.5; }; " WHITE WALL, "cells", "beyond the grid of 4 x 3"},
+    {GRID "change = { cells = [2, 0, 1, 1]; for_s = 2.0; every_s = 1.5; }; " WHITE WALL, "every_s", "gone in between"},
     {GRID "camera = { vignetting = 0.96; }; " WHITE WALL, "vignetting", "legal is 0 to 0.95"},
     {GRID "camera = { photon_noise = 1; }; " WHITE WALL, "photon_noise", "must be true or false"},
     {GRID "ambient = -1.0; " WHITE WALL, "ambient", "legal is 0 to 1e+06"},

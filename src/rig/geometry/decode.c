@@ -14,7 +14,7 @@ enum { TILE = 64, FEW_LIT = 64, COARSEST = 4, HYPOTHESES_MAX = 3 * CLT_BLUR_STEP
 #define LIT 6.0          /* amplitude over noise from which a pixel is decoded */
 #define LEAST_LIGHT 0.03 /* of full scale: below it a longer exposure tells more */
 #define SURE 3.0         /* difference over noise from which its sign counts */
-#define WHOLE 0.45       /* share of a bit's full height from which one place lights the pixel */
+#define WHOLE 0.3        /* share of a bit's full height from which one place lights the pixel */
 /* Share of the amplitude that a profile is trusted to. Light that scatters to one side shifts the edges of wide
  * stripes, while fine ones show the direct light's place; so wide ones only tell the cell. */
 #define TRUST_FINE 0.07F

@@ -53,21 +53,19 @@ clt_status clt_exposure_base(clt_field_bench *bench, double *base_s, clt_finding
   return status;
 }
 
-enum { FLICKER_FRAMES = 24 };
-
 typedef struct series {
-  double at_s[FLICKER_FRAMES], light[FLICKER_FRAMES];
+  double at_s[CLT_FLICKER_FRAMES], light[CLT_FLICKER_FRAMES];
 } series;
 
 /* Least squares of mean + a cos + b sin; the amplitude, and what is left of the variance. */
 static double fit_sine(const series *seen, double mean, double hz, double *left) {
   double cc = 0, ss = 0, cs = 0, c0 = 0, s0 = 0, yc = 0, ys = 0, yy = 0;
-  for (int n = 0; n < FLICKER_FRAMES; n++) {
+  for (int n = 0; n < CLT_FLICKER_FRAMES; n++) {
     double c = cos(2 * M_PI * hz * seen->at_s[n]), s = sin(2 * M_PI * hz * seen->at_s[n]);
-    c0 += c / FLICKER_FRAMES;
-    s0 += s / FLICKER_FRAMES;
+    c0 += c / CLT_FLICKER_FRAMES;
+    s0 += s / CLT_FLICKER_FRAMES;
   }
-  for (int n = 0; n < FLICKER_FRAMES; n++) {
+  for (int n = 0; n < CLT_FLICKER_FRAMES; n++) {
     double c = cos(2 * M_PI * hz * seen->at_s[n]) - c0, s = sin(2 * M_PI * hz * seen->at_s[n]) - s0;
     double y = seen->light[n] - mean;
     cc += c * c;
@@ -93,17 +91,17 @@ clt_status clt_flicker_measure(clt_field_bench *bench, double seconds, clt_flick
   double mean = 0, best = INFINITY;
   *out = (clt_flicker){0};
   clt_status status = clt_field_show(bench, dark, &ready_ns, error);
-  for (int n = 0; n < FLICKER_FRAMES && status == CLT_OK; n++) {
+  for (int n = 0; n < CLT_FLICKER_FRAMES && status == CLT_OK; n++) {
     clt_field field;
     status = clt_field_take(bench, ready_ns, seconds, 1, NULL, NULL, &field, error);
     seen.at_s[n] = field.at_s;
     seen.light[n] = (field.light[0] + field.light[1] + field.light[2]) / bench->channels;
-    mean += seen.light[n] / FLICKER_FRAMES;
+    mean += seen.light[n] / CLT_FLICKER_FRAMES;
     ready_ns = (int64_t)(field.at_s * 1e9);
   }
   for (int k = 0; k < 2 && status == CLT_OK; k++) {
     double left = 0, amplitude = fit_sine(&seen, mean, candidates[k], &left);
-    double spread = sqrt(left / (FLICKER_FRAMES - 3)), error_of_it = spread * sqrt(2.0 / FLICKER_FRAMES);
+    double spread = sqrt(left / (CLT_FLICKER_FRAMES - 3)), error_of_it = spread * sqrt(2.0 / CLT_FLICKER_FRAMES);
     double phase = M_PI * candidates[k] * seconds, kept = fabs(sin(phase) / phase);
     if (amplitude > 5 * error_of_it && amplitude > 0.01 * fabs(mean) * kept && left < best) {
       best = left;

@@ -15,8 +15,9 @@ typedef struct clt_flicker {
   double hz;    /* 100 or 120; 0: none was seen */
   double depth; /* amplitude over the dark panel's mean */
 } clt_flicker;
-/* Fits sines of 100 and 120 Hz to the mean light of 24 short frames in a row. Flicker that the frame rate divides (100
- * Hz at 50 or 100 frames a second) stands still and is not seen. */
+enum { CLT_FLICKER_FRAMES = 24 };
+/* Fits sines of 100 and 120 Hz to the mean light of so many short frames in a row. Flicker that the frame rate divides
+ * (100 Hz at 50 or 100 frames a second) stands still and is not seen. */
 clt_status clt_flicker_measure(clt_field_bench *bench, double seconds, clt_flicker *out, clt_error *error);
 
 /* What the choice rests on. Rates are fractions of full scale a second. */

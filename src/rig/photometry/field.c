@@ -98,6 +98,14 @@ static clt_status next_frame(clt_field_bench *bench, bool compare, int64_t ready
                  : clt_shots_take(bench->shots, ready_ns, seconds, frame, error);
 }
 
+static clt_status report(clt_field_bench *bench, clt_error *error) {
+  bench->done++;
+  bench->expected = bench->done > bench->expected ? bench->done : bench->expected;
+  return bench->progress == NULL || bench->progress(bench->context, bench->done, bench->expected)
+             ? CLT_OK
+             : clt_fail(error, CLT_CANCELLED, "photometry was stopped after %d fields", bench->done);
+}
+
 clt_status clt_field_take(clt_field_bench *bench, int64_t ready_ns, double seconds, int frames, clt_field_look *look,
                           void *context, clt_field *field, clt_error *error) {
   bool compare = frames >= CLT_STEADY_HELD;
@@ -121,7 +129,7 @@ clt_status clt_field_take(clt_field_bench *bench, int64_t ready_ns, double secon
     field->light[c] /= frames;
     field->saturated[c] /= frames;
   }
-  return status;
+  return status == CLT_OK ? report(bench, error) : status;
 }
 
 clt_status clt_field_see(clt_field_bench *bench, const double code[CLT_FIELD_CHANNELS], double seconds, int frames,

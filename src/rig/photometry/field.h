@@ -20,6 +20,9 @@ typedef struct clt_field_bench {
   size_t lit;     /* pixels in all groups */
   float *light;   /* of every code value, fraction of full scale */
   double black_level;
+  int done, expected;                                   /* fields taken, and until the end, which may grow */
+  bool (*progress)(void *context, int done, int total); /* after every field; false stops it. May be NULL */
+  void *context;
 } clt_field_bench;
 
 /* What one field looked like. */
@@ -41,7 +44,7 @@ void clt_field_set_response(clt_field_bench *bench, double black_level, const cl
 clt_status clt_field_show(clt_field_bench *bench, const double code[CLT_FIELD_CHANNELS], int64_t *ready_ns,
                           clt_error *error);
 /* Takes the mean over `frames` frames of what is shown, which agree with each other where they are three or more, and
- * hands each frame to `look` (which may be NULL). */
+ * hands each frame to `look` (which may be NULL). CLT_CANCELLED where the progress says so. */
 typedef void clt_field_look(void *context, const clt_field_bench *bench, const clt_frame *frame);
 clt_status clt_field_take(clt_field_bench *bench, int64_t ready_ns, double seconds, int frames, clt_field_look *look,
                           void *context, clt_field *field, clt_error *error);

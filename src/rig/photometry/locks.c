@@ -4,6 +4,7 @@
 
 #define BEFORE_S 2.0 /* that another picture is shown before */
 #define STEP_S 0.2   /* from sample to sample */
+#define FIELD_S 0.1  /* that the frames of a sample take */
 /* Movements that a locked camera does not show. */
 #define GAIN_MOVES 0.01
 #define DRIFT_MOVES 0.015
@@ -138,13 +139,21 @@ static void judge(const clt_locks *locks, clt_findings *findings) {
   }
 }
 
+static double watched(double watch_s) {
+  return 1.25 * watch_s + 2 * BEFORE_S;
+}
+
+int clt_locks_fields(double watch_s) {
+  return watch_s > 0 ? (int)(watched(watch_s) / (STEP_S + FIELD_S)) : 0;
+}
+
 clt_status clt_locks_check(clt_field_bench *bench, double base_s, double watch_s, clt_locks *out,
                            clt_findings *findings, clt_error *error) {
   static const double before[2][CLT_FIELD_CHANNELS] = {{0, 0, 0}, {1, 0, 0}};
   const double seconds[2] = {watch_s, 0.25 * watch_s};
   watch seen, ignored;
   double settles[2] = {0, 0};
-  *out = (clt_locks){.seconds = 1.25 * watch_s + 2 * BEFORE_S, .obedience = INFINITY};
+  *out = (clt_locks){.seconds = watched(watch_s), .obedience = INFINITY};
   for (int k = 0; k < 2; k++) {
     int64_t ready_ns = 0;
     clt_status status = clt_field_show(bench, before[k], &ready_ns, error);

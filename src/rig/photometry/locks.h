@@ -21,4 +21,7 @@ typedef struct clt_locks {
 clt_status clt_locks_check(clt_field_bench *bench, double base_s, double watch_s, clt_locks *out,
                            clt_findings *findings, clt_error *error);
 
+/* Fields that it takes with a camera of 30 frames a second, about; 0 where it is not watched. */
+int clt_locks_fields(double watch_s);
+
 #endif

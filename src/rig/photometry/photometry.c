@@ -57,16 +57,38 @@ static void judge_projector(const clt_photometry_report *report, int channels, c
   }
 }
 
+typedef enum step { BASE, GROUPS, LOCKS, BLACK_LEVEL, RESPONSE, NOISE, RAMPS, FLICKER, STEPS } step;
+
+/* Fields that are still to come with a step and all after it, about: those of the locks and the ramps by their options.
+ */
+static void expect(clt_field_bench *bench, const clt_photometry_options *options, step next) {
+  const int fields[STEPS] = {[BASE] = 8,
+                             [GROUPS] = 2,
+                             [LOCKS] = clt_locks_fields(options->watch_s),
+                             [BLACK_LEVEL] = 2,
+                             [RESPONSE] = CLT_BRACKET_FIELDS * CLT_BRACKET_EXPOSURES,
+                             [NOISE] = CLT_NOISE_LEVELS + CLT_NOISE_DARKS,
+                             [RAMPS] = clt_projector_fields(bench->channels, options->levels),
+                             [FLICKER] = CLT_FLICKER_FRAMES + 1};
+  bench->expected = bench->done;
+  for (step k = next; k < STEPS; k++) {
+    bench->expected += fields[k];
+  }
+}
+
 /* The camera: locks, black level, response, noise. */
 static clt_status measure_camera(clt_field_bench *bench, const clt_photometry_options *options, clt_photometry *out,
                                  clt_photometry_report *report, clt_error *error) {
   clt_findings *findings = &report->findings;
+  expect(bench, options, BASE);
   clt_status status = clt_exposure_base(bench, &report->base_s, findings, error);
   status = status == CLT_OK ? clt_field_find_groups(bench, report->base_s, options->frames, error) : status;
   report->lit = bench->lit;
+  expect(bench, options, LOCKS);
   if (status == CLT_OK && options->watch_s > 0) {
     status = clt_locks_check(bench, report->base_s, options->watch_s, &report->locks, findings, error);
   }
+  expect(bench, options, BLACK_LEVEL);
   status = status == CLT_OK ? clt_sensor_black_level(bench, options->frames, &out->black_level, error) : status;
   if (status == CLT_OK) {
     clt_field_set_response(bench, out->black_level, &(clt_curve){.kind = CLT_CURVE_LINEAR});
@@ -75,6 +97,7 @@ static clt_status measure_camera(clt_field_bench *bench, const clt_photometry_op
   if (status == CLT_OK) {
     out->camera = report->camera.curve;
     clt_field_set_response(bench, out->black_level, &out->camera);
+    expect(bench, options, NOISE);
     status = clt_sensor_noise_measure(bench, report->base_s, options->frames, &report->noise, error);
   }
   out->full_well = report->noise.full_well;
@@ -88,6 +111,7 @@ static clt_status choose_exposures(clt_field_bench *bench, const clt_photometry_
   static const double white[CLT_FIELD_CHANNELS] = {1, 1, 1};
   const clt_camera_info *sensor = &bench->shots->sensor;
   clt_field field;
+  expect(bench, options, FLICKER);
   clt_status status =
       clt_flicker_measure(bench, fmax(0.25 * report->base_s, sensor->exposure_min_s), &report->flicker, error);
   status = status == CLT_OK ? clt_field_see(bench, white, report->base_s, options->frames, &field, error) : status;
@@ -139,9 +163,12 @@ clt_status clt_photometry_measure(clt_shots *shots, const clt_photometry_options
                     shots->panel.channels, shots->sensor.channels);
   }
   clt_status status = clt_field_bench_init(&bench, shots, error);
+  bench.progress = whole.progress;
+  bench.context = whole.context;
   status = status == CLT_OK ? measure_camera(&bench, &whole, out, report, error) : status;
   if (status == CLT_OK) {
     judge_camera(report, &report->findings);
+    expect(&bench, &whole, RAMPS);
     status = clt_projector_measure(&bench, report->base_s, whole.levels, whole.frames, &report->projector, error);
   }
   if (status == CLT_OK) {

@@ -27,6 +27,8 @@ typedef struct clt_photometry_options {
   int frames;     /* averaged for each field, 1..64; 0 means 6; a multiple of 3 averages flicker out */
   double watch_s; /* for which the locks are watched; 0 means 20, negative not at all */
   double snr;     /* wanted of one pixel at the dark panel's light by the longest exposure; 0 means 40 */
+  bool (*progress)(void *context, int done, int total); /* of fields, about; false stops (CLT_CANCELLED). May be NULL */
+  void *context;
 } clt_photometry_options;
 
 /* What was seen on the way. */

@@ -216,3 +216,7 @@ clt_status clt_projector_measure(clt_field_bench *bench, double base_s, int leve
   }
   return status;
 }
+
+int clt_projector_fields(int channels, int levels) {
+  return EXPOSURES + 1 + channels * (levels - 1 + (levels - 1) / BETWEEN_REFERENCES);
+}

@@ -23,4 +23,7 @@ typedef struct clt_projector_photometry {
 clt_status clt_projector_measure(clt_field_bench *bench, double base_s, int levels, int frames,
                                  clt_projector_photometry *out, clt_error *error);
 
+/* Fields that it takes, about: a level takes more than one where a longer exposure turns out to be saturated. */
+int clt_projector_fields(int channels, int levels);
+
 #endif

@@ -76,9 +76,7 @@ clt_status clt_sensor_black_level(clt_field_bench *bench, int frames, double *bl
 
 enum {
   GROUPS = CLT_FIELD_GROUPS * CLT_FIELD_CHANNELS,
-  FIELDS = 5,
-  DARK_EXPOSURES = 14,
-  POINTS_MAX = GROUPS * (FIELDS + DARK_EXPOSURES),
+  POINTS_MAX = GROUPS * (CLT_NOISE_LEVELS + CLT_NOISE_DARKS),
   PASSES = 6
 };
 #define OUTLIER 4.0
@@ -192,14 +190,14 @@ static void fit(const transfer *self, clt_sensor_noise *out, double *slope, doub
 static clt_status see_fields(transfer *self, clt_field_bench *bench, double seconds, int frames, clt_error *error) {
   int64_t ready_ns = 0;
   clt_status status = clt_field_show(bench, dark, &ready_ns, error);
-  for (int k = 0; k < DARK_EXPOSURES && status == CLT_OK; k++) {
+  for (int k = 0; k < CLT_NOISE_DARKS && status == CLT_OK; k++) {
     double shorter = seconds / pow(1.5, k);
     if (shorter >= bench->shots->sensor.exposure_min_s) {
       status = add_field(self, bench, ready_ns, shorter, frames, error);
     }
   }
-  for (int k = 1; k <= FIELDS && status == CLT_OK; k++) {
-    double level = (double)k / FIELDS, code[CLT_FIELD_CHANNELS] = {level, level, level};
+  for (int k = 1; k <= CLT_NOISE_LEVELS && status == CLT_OK; k++) {
+    double level = (double)k / CLT_NOISE_LEVELS, code[CLT_FIELD_CHANNELS] = {level, level, level};
     status = clt_field_show(bench, code, &ready_ns, error);
     status = status == CLT_OK ? add_field(self, bench, ready_ns, seconds, frames, error) : status;
   }

@@ -8,6 +8,9 @@
  * mean without outliers; where noise is cut off at 0, the middle between two quantiles that are not. */
 clt_status clt_sensor_black_level(clt_field_bench *bench, int frames, double *black_level, clt_error *error);
 
+/* That the noise is measured with, at most: brightnesses, and exposures of the dark panel. */
+enum { CLT_NOISE_LEVELS = 5, CLT_NOISE_DARKS = 14 };
+
 typedef struct clt_sensor_noise {
   double full_well;  /* electrons at full scale: 1 / slope of variance against mean */
   double read_noise; /* electrons rms */

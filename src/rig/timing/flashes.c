@@ -90,6 +90,10 @@ static clt_status record(clt_shots *shots, recording *self, const clt_latency_op
       status =
           record_frames(shots, self, 2 + (int)((bits >> 8) % (FRAMES_PER_FLASH - 2)), &last_ns, &digest, out, error);
     }
+    if (status == CLT_OK && options->progress != NULL &&
+        !options->progress(options->context, i + 1, options->flashes)) {
+      status = clt_fail(error, CLT_CANCELLED, "timing was stopped after %d flashes", i + 1);
+    }
   }
   free(codes);
   return status;

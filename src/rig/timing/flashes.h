@@ -20,6 +20,9 @@ typedef struct clt_latency_options {
   double longest_s;  /* delay looked for; 0 means 0.5 */
   double exposure_s; /* at which the bright field is not saturated; 0: the camera's frame time */
   unsigned seed;     /* of the flashes */
+  bool (*progress)(void *context, int done,
+                   int total); /* after every flash; false stops (CLT_CANCELLED). May be NULL */
+  void *context;
 } clt_latency_options;
 
 typedef struct clt_latency {
