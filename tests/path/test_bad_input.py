@@ -124,6 +124,8 @@ class BadInput(PathTest):
         self.refused("compensate", self.good, "--target", self.picture, names="--output OUT")
         self.refused("compensate", self.good, "--target", names="--target")
         self.refused("relight", self.good, "-o", self.out, names="--light")
+        self.refused("inspect", names="T.h5 is missing")
+        self.refused("scene", "explain", names="SCENE is missing")
         self.refused("acquire", "-o", self.folder / "new.h5", names="--config")
         self.refused("acquire", "--scene", "s.cfg", names="--output")
         self.refused("simulate", "s.cfg", "-o", self.out, names="--drive")
