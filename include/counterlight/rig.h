@@ -24,6 +24,9 @@ typedef struct clt_rig_info {
    * the other exposures of theirs. */
   long repeated, strange, torn;
   double seconds; /* on the devices' clock, when the last frame began */
+  /* What clt_panel_shown needs to tell the light of a drive; NULL: drives are shown as they are. The rig's. */
+  const clt_panel *panel;
+  int panel_bits;
 } clt_rig_info;
 
 typedef struct clt_rig_operations {

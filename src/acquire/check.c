@@ -1,6 +1,7 @@
 /* How well a transport predicts what is observed. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "acquire/session.h"
 #include "base/memory.h"
@@ -18,18 +19,34 @@ void clt_session_draw(clt_session *session, unsigned number) {
   }
 }
 
+/* The drive as the panel showed it: one whose channels mix has no code for every colour. shown is initialised here. */
+static clt_status find_shown(const clt_session *session, clt_image *shown, clt_error *error) {
+  const clt_image *drive = &session->drive;
+  if (session->info.panel != NULL) {
+    return clt_panel_shown(session->info.panel, session->info.panel_bits, drive, shown, error);
+  }
+  clt_status status = clt_image_init(shown, drive->channels, drive->height, drive->width, error);
+  if (status == CLT_OK) {
+    memcpy(shown->data, drive->data, clt_image_size(drive) * sizeof *drive->data);
+  }
+  return status;
+}
+
 /* ||b0 + T x - y||^2, less what the noise of y adds to it, and ||y||^2. */
 typedef struct miss {
   double wrong, seen;
 } miss;
 
 /* Adds the last observation's; x and y are workspace of `cells` values each. */
-static void add_miss(const clt_session *session, const clt_transport *transport, double *x, double *y, miss *sum) {
+static clt_status add_miss(const clt_session *session, const clt_transport *transport, double *x, double *y, miss *sum,
+                           clt_error *error) {
   size_t cells = session->cells;
-  for (int c = 0; c < session->info.channels; c++) {
+  clt_image shown = {0};
+  clt_status status = find_shown(session, &shown, error);
+  for (int c = 0; status == CLT_OK && c < session->info.channels; c++) {
     size_t first = (size_t)c * cells;
     for (size_t j = 0; j < cells; j++) {
-      x[j] = session->drive.data[first + j];
+      x[j] = shown.data[first + j];
     }
     clt_transport_apply(transport, c, x, y);
     for (size_t i = 0; i < cells; i++) {
@@ -41,6 +58,8 @@ static void add_miss(const clt_session *session, const clt_transport *transport,
       }
     }
   }
+  clt_image_finish(&shown);
+  return status;
 }
 
 static double *make_workspace(const clt_session *session, clt_error *error) {
@@ -62,10 +81,10 @@ clt_status clt_session_miss(const clt_session *session, const clt_transport *tra
     return CLT_FAILED;
   }
   miss sum = {0};
-  add_miss(session, transport, x, x + session->cells, &sum);
+  clt_status status = add_miss(session, transport, x, x + session->cells, &sum, error);
   free(x);
   *relative = relative_miss(&sum);
-  return CLT_OK;
+  return status;
 }
 
 clt_status clt_session_check(clt_session *session, const clt_transport *transport, double *relative, clt_error *error) {
@@ -76,7 +95,7 @@ clt_status clt_session_check(clt_session *session, const clt_transport *transpor
     clt_session_draw(session, (unsigned)k);
     status = clt_session_observe(session, "check", error);
     if (status == CLT_OK) {
-      add_miss(session, transport, x, x + session->cells, &sum);
+      status = add_miss(session, transport, x, x + session->cells, &sum, error);
     }
   }
   free(x);

@@ -54,6 +54,9 @@ static void fill_lit_row(const clt_lit_inverse *inverse, size_t lit, double firs
 static void fill_dark_row(const clt_lit_inverse *inverse, const double *seen, double *brief) {
   blasint count = (blasint)inverse->count;
   double *known = brief + inverse->count;
+  if (count == 0) {
+    return;
+  }
   for (size_t j = 0; j < inverse->count; j++) {
     known[j] = seen[inverse->cell[j]];
   }

@@ -171,6 +171,9 @@ static void print_terms(const task *t) {
 static clt_status run_task(const cli_arguments *arguments, task *t, clt_error *error) {
   clt_status status = cli_input_open(arguments->positional[0], &t->input, error);
   if (!status) {
+    status = cli_input_check_lit(&t->input, arguments->positional[0], error);
+  }
+  if (!status) {
     status = cli_input_calibrate(t->calibration, &t->input, error);
   }
   if (!status) {

@@ -95,6 +95,17 @@ static clt_status take_word(reader *r, clt_error *error) {
   return CLT_OK;
 }
 
+/* The word of the synopsis that stands for the next positional argument. */
+static clt_status fail_missing(const cli_command *command, int given, clt_error *error) {
+  const char *word = command->synopsis;
+  for (int k = 0; k < given; k++) {
+    word += strcspn(word, " ");
+    word += strspn(word, " ");
+  }
+  return clt_fail(error, CLT_BAD_INPUT, "%.*s is missing; usage: counterlight %s %s", (int)strcspn(word, " ,"), word,
+                  command->name, command->synopsis);
+}
+
 clt_status cli_parse(const cli_command *command, int count, char *const *words, cli_arguments *arguments,
                      bool *wants_help, clt_error *error) {
   reader r = {.command = command, .count = count, .words = words, .arguments = arguments, .wants_help = wants_help};
@@ -107,8 +118,7 @@ clt_status cli_parse(const cli_command *command, int count, char *const *words, 
     }
   }
   if (!*wants_help && arguments->positional_count < command->positional_least) {
-    return clt_fail(error, CLT_BAD_INPUT, "something is missing; usage: counterlight %s %s", command->name,
-                    command->synopsis);
+    return fail_missing(command, arguments->positional_count, error);
   }
   return CLT_OK;
 }

@@ -61,6 +61,9 @@ static clt_status read_options(const cli_command *command, const cli_arguments *
 static clt_status solve(const char *transport, task *t, clt_error *error) {
   clt_status status = cli_input_open(transport, &t->input, error);
   if (!status) {
+    status = cli_input_check_lit(&t->input, transport, error);
+  }
+  if (!status) {
     status = cli_input_calibrate(t->calibration, &t->input, error);
   }
   if (!status) {

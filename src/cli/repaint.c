@@ -177,6 +177,9 @@ static int run(const cli_command *command, const cli_arguments *arguments) {
     status = cli_input_open(arguments->positional[0], &t.input, &error);
   }
   if (!status) {
+    status = cli_input_check_lit(&t.input, arguments->positional[0], &error);
+  }
+  if (!status) {
     status = cli_input_calibrate(cli_value(command, arguments, "calibration"), &t.input, &error);
   }
   if (!status) {

@@ -28,12 +28,27 @@ static bool tell(void *context, const char *part, int done, int parts) {
   return !cli_interrupted();
 }
 
+/* Fig. 10's sizes; the report's. */
+static clt_status check_size(int largest, clt_error *error) {
+  static const int sizes[] = {0, 80, 320, 1280, 5120, 10240};
+  for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++) {
+    if (largest == sizes[k]) {
+      return CLT_OK;
+    }
+  }
+  return clt_fail(error, CLT_BAD_INPUT, "--largest: %d is no size of Fig. 10; take 80, 320, 1280, 5120 or 10240",
+                  largest);
+}
+
 static clt_status read_options(const cli_command *command, const cli_arguments *arguments, char *folder,
                                clt_reproduce_options *options_out, clt_error *error) {
   clt_status status = cli_folder_choose(cli_value(command, arguments, "output"), "reproduced", folder, error);
   options_out->largest = cli_value(command, arguments, "quick") ? QUICK : 0;
   if (!status) {
     status = cli_integer(command, arguments, "largest", 80, 10240, &options_out->largest, error);
+  }
+  if (!status) {
+    status = check_size(options_out->largest, error);
   }
   if (!status) {
     status = cli_scenes_folder(&options_out->scenes, error);

@@ -21,6 +21,8 @@ clt_status cli_input_open(const char *path, cli_input *input, clt_error *error);
 clt_status cli_input_calibrate(const char *path, cli_input *input, clt_error *error);
 /* CLT_BAD_INPUT where path would hold panel values and the panel is not known. */
 clt_status cli_input_check_drive(const cli_input *input, const char *path, clt_error *error);
+/* CLT_BAD_INPUT where no cell is lit: no drive changes what is seen, and an error of 0 would say nothing. */
+clt_status cli_input_check_lit(const cli_input *input, const char *path, clt_error *error);
 void cli_input_close(cli_input *input);
 
 /* The white of every channel as the certificate has it; 1 where a channel has no lit cell. */

@@ -21,7 +21,9 @@ static void describe_rig(const clt_rig *base, clt_rig_info *info) {
                          .repeated = rig->shots.stuck,
                          .strange = rig->strange,
                          .torn = rig->torn,
-                         .seconds = (double)rig->shots.last_ns * 1e-9};
+                         .seconds = (double)rig->shots.last_ns * 1e-9,
+                         .panel = &rig->config.projector,
+                         .panel_bits = rig->shots.panel.bits};
 }
 
 static void close_rig(clt_rig *base) {

@@ -9,7 +9,9 @@
 #include "solve/choose.h"
 #include "solve/job.h"
 
-static const double CLIP_SLACK = 1e-9; /* a drive this far outside 0..1 counts as inside */
+/* A drive that leaves 0..1 by this part of its largest value counts as inside; relative, since that of a dim picture is
+ * small all over. */
+static const double CLIP_SLACK = 1e-9;
 
 static clt_status choose_method(clt_solver *solver, clt_error *error) {
   const char *name = solver->options.method;
@@ -173,9 +175,14 @@ static clt_status run_method(clt_job *job, const clt_method *method, clt_run *ru
 
 static size_t count_outside(const clt_system *system) {
   size_t outside = 0;
+  double largest = 0;
+  for (size_t j = 0; j < system->cols; j++) {
+    largest = fmax(largest, fabs(system->light[j] * system->scale[j]));
+  }
+  double slack = CLIP_SLACK * fmin(largest, 1);
   for (size_t j = 0; j < system->cols; j++) {
     double x = system->light[j] * system->scale[j];
-    outside += x < -CLIP_SLACK || x > 1 + CLIP_SLACK;
+    outside += x < -slack || x > 1 + slack;
   }
   return outside;
 }

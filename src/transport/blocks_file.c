@@ -30,6 +30,9 @@ clt_status clt_blocks_check(const clt_transport *transport, const char *source, 
 
 /* Every cell lies in one of the blocks and has a flux that can be one. */
 static clt_status check_cells(const clt_block_storage *own, size_t cells, const char *source, clt_error *error) {
+  if (own->count == 0) {
+    return clt_fail(error, CLT_BAD_INPUT, "%s: /blocks/column has no block; there is one at least", source);
+  }
   for (size_t j = 0; j < cells; j++) {
     if (own->block[j] < 0 || (size_t)own->block[j] >= own->count) {
       return clt_fail(error, CLT_BAD_INPUT, "%s: /blocks/block[%zu] is %d; there are the blocks 0..%zu", source, j,

@@ -92,6 +92,19 @@ class Analysis(PathTest):
             self.assertAlmostEqual(np.mean(ratios), 1, delta=0.15)
         self.assertGreater(np.linalg.norm(self.forward("--forward", "montecarlo", "--seed", 1)[0] - seen), 0)
 
+    def test_paths_in_a_room_that_one_channel_does_not_light(self):
+        self.given(3)
+        self.dense[1] = 0
+        write_transport(self.transport, self.dense, WIDTH, HEIGHT, self.black)
+        done = run("relight", self.transport, "--light", self.drive, "-o", self.folder / "seen.npy", "--forward",
+                   "montecarlo", "--samples", 1000)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertNotIn("illegal", done.stdout)
+        seen = np.load(self.folder / "seen.npy").reshape(3, -1)
+        whole = appearance(self.dense, self.black, self.x)
+        np.testing.assert_array_equal(seen[1], self.black[1])
+        self.assertLess(relative_error(seen, whole), 0.05)
+
     def test_forward_refuses(self):
         self.given(1)
         words = ("relight", self.transport, "--light", self.drive, "-o", self.folder / "y.npy")

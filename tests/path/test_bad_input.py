@@ -2,7 +2,7 @@
 import h5py
 import numpy as np
 
-from support import PathTest, main, room, write_png, write_transport
+from support import PathTest, main, room, run, write_png, write_transport
 
 WIDTH, HEIGHT = 6, 4
 SCENE = """
@@ -43,6 +43,25 @@ class BadInput(PathTest):
             path = self.folder / f"{name}.h5"
             write_transport(path, dense, WIDTH, HEIGHT)
             self.compensate(path, names=path.name)
+
+    def test_transport_that_no_drive_lights(self):
+        dark = self.folder / "dark.h5"
+        write_transport(dark, 0 * self.dense, WIDTH, HEIGHT, np.full((1, WIDTH * HEIGHT), 0.1))
+        self.compensate(dark, names="no cell of this transport is lit")
+        self.refused("bounces", dark, "--drive", self.picture, "-o", self.folder / "bounces", names="dark.h5")
+        self.refused("repaint", dark, "--photo", self.picture, "--drive", self.picture, "-o", self.out,
+                     names="dark.h5")
+        self.assertEqual(run("inspect", dark).returncode, 0)
+
+    def test_blocks_without_a_block(self):
+        empty, cells = self.folder / "empty.h5", WIDTH * HEIGHT
+        with h5py.File(empty, "w") as file:
+            file.attrs.update(format="counterlight-transport", version=1, width=WIDTH, height=HEIGHT, channels=1)
+            for name, values in {"block": np.zeros(cells, "i4"), "flux": np.ones(cells, "f4"),
+                                 "column": np.zeros((1, 0, cells), "f4"), "start": np.arange(cells + 1),
+                                 "cell": np.arange(cells), "value": np.ones((1, cells), "f4")}.items():
+                file["blocks/" + name] = values
+        self.assertIn("one at least", self.compensate(empty, names="/blocks/column"))
 
     def test_transport_of_a_wrong_shape(self):
         wrong = self.folder / "wrong.h5"
@@ -105,6 +124,8 @@ class BadInput(PathTest):
         self.refused("compensate", self.good, "--target", self.picture, names="--output OUT")
         self.refused("compensate", self.good, "--target", names="--target")
         self.refused("relight", self.good, "-o", self.out, names="--light")
+        self.refused("inspect", names="T.h5 is missing")
+        self.refused("scene", "explain", names="SCENE is missing")
         self.refused("acquire", "-o", self.folder / "new.h5", names="--config")
         self.refused("acquire", "--scene", "s.cfg", names="--output")
         self.refused("simulate", "s.cfg", "-o", self.out, names="--drive")

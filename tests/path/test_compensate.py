@@ -62,6 +62,18 @@ class Compensate(PathTest):
             self.assertEqual(answer["grid"], {"width": WIDTH, "height": HEIGHT, "channels": channels})
             self.assertAlmostEqual(answer["white"][0], 1.0)
 
+    def test_a_dim_picture_is_bounded_as_a_bright_one(self):
+        self.given(1, 0.9, smooth_picture(1))
+        self.dense[0, 11] = self.dense[0, 40] = 0  # cells that show nothing, whose light the others still get
+        self.black[:] = 0
+        write_transport(self.transport, self.dense, WIDTH, HEIGHT, self.black)
+        errors = []
+        for white in (1e-1, 1e-12):
+            answer = self.compensate(self.folder / "drive.npy", white=white)
+            self.assertEqual(answer["method"], "bounded")
+            errors.append(answer["error_after"])
+        self.assertAlmostEqual(errors[0], errors[1], delta=1e-3 * errors[0])
+
     def test_png_drive_holds_panel_values(self):
         self.given(3, 0.5, smooth_picture(3))
         exact = self.compensate(self.folder / "drive.npy")

@@ -89,7 +89,7 @@ class Reproduce(PathTest):
             self.assertIn(row["name"].replace("<", "&lt;"), page)
 
     def test_bad_words_are_refused(self):
-        for words in (("--largest", "7"), ("--quick", "7"), ("--largest", "x"), ("-o", "/proc/nothing/there")):
+        for words in (("--largest", "7"), ("--largest", "100"), ("--quick", "7"), ("--largest", "x"), ("-o", "/proc/nothing/there")):
             self.refused("reproduce", *words)
 
 
