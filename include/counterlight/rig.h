@@ -27,6 +27,8 @@ typedef struct clt_rig_info {
   /* What clt_panel_shown needs to tell the light of a drive; NULL: drives are shown as they are. The rig's. */
   const clt_panel *panel;
   int panel_bits;
+  double rounding; /* radiance by which dark values are off together, observation after observation, as a standard
+                      deviation: steps of the camera that its noise does not dither; 0: it does */
 } clt_rig_info;
 
 typedef struct clt_rig_operations {

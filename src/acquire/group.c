@@ -22,7 +22,7 @@ void clt_group_finish(clt_group *group) {
 void clt_group_clear(clt_group *group) {
   const size_t bytes = clt_image_size(&group->drive) * sizeof *group->drive.data;
   group->count = 0;
-  group->weight = 0;
+  group->weight = group->size = 0;
   memset(group->drive.data, 0, bytes);
   memset(group->light.data, 0, bytes);
   memset(group->variance.data, 0, bytes);
@@ -67,14 +67,15 @@ void clt_group_add(clt_group *group, double weight, const clt_image *drive, cons
   }
   group->count++;
   group->weight += weight;
+  group->size += fabs(weight);
 }
 
 /* With b = black + e, light misses weight x e and the photograph's own black e. */
-void clt_group_expect(clt_group *group, const clt_image *black, const clt_image *black_variance) {
-  const float error = (float)(group->weight - 1);
+void clt_group_expect(clt_group *group, const clt_image *black, const clt_image *black_variance, double rounding) {
+  const float error = (float)(group->weight - 1), together = (float)(group->size * rounding);
   for (size_t i = 0; i < clt_image_size(black); i++) {
     group->light.data[i] += black->data[i];
-    group->variance.data[i] += error * error * black_variance->data[i];
+    group->variance.data[i] += error * error * black_variance->data[i] + together * together;
   }
 }
 

@@ -10,7 +10,7 @@
 
 typedef struct clt_group {
   long count;                /* photographs in it */
-  double weight;             /* the sum of their weights */
+  double weight, size;       /* the sum of their weights, and of their absolute values */
   clt_image drive;           /* sum of weight x drive */
   clt_image light, variance; /* sums of weight x (seen - black) and of weight^2 x deviation^2 */
 } clt_group;
@@ -29,9 +29,9 @@ bool clt_group_is_full(const clt_group *group, const clt_image *black_variance);
 void clt_group_add(clt_group *group, double weight, const clt_image *drive, const clt_image *seen,
                    const clt_image *deviation, const clt_image *black);
 
-/* Turns light and variance into what a photograph of the drive must show: black, whose error is in all of them, added.
- * Nothing may be added afterwards until it is cleared. */
-void clt_group_expect(clt_group *group, const clt_image *black, const clt_image *black_variance);
+/* Turns light and variance into what a photograph of the drive must show: black, whose error is in all of them, added;
+ * and so is `rounding`, clt_rig_info's. Nothing may be added afterwards until it is cleared. */
+void clt_group_expect(clt_group *group, const clt_image *black, const clt_image *black_variance, double rounding);
 /* Whether both are of the same drive. */
 bool clt_group_alike(const clt_group *group, const clt_group *other);
 

@@ -189,7 +189,7 @@ static clt_status look_at_sum(clt_session *session, clt_error *error) {
   if (status != CLT_OK) {
     return status;
   }
-  clt_group_expect(group, &session->black, &session->black_variance);
+  clt_group_expect(group, &session->black, &session->black_variance, session->info.rounding);
   clt_change change = clt_watch_compare_lamp(&group->light, &group->variance, &session->black, &session->seen,
                                              &session->deviation, CLT_STEADY, lamp);
   status = change.share > 0 ? judge_group(session, &change, error) : CLT_OK;

@@ -139,6 +139,13 @@ double clt_merge_variance(const clt_merge *merge, const clt_merge_sum *sum, doub
   return (own / (double)sum->count + shared) / (t * t);
 }
 
+double clt_merge_rounding(const clt_merge *merge, double t) {
+  const clt_merge_sum dark = {.raw = (float)merge->camera.black_level};
+  double shared = 0;
+  sample_variance(merge, &dark, 0, &shared);
+  return sqrt(shared) / (t * merge->camera.responsivity);
+}
+
 /* What rounding to the camera's steps shifts the mean of samples at a code value, noise in units of h. */
 static double rounding(const clt_merge *merge, double code, double noise) {
   double step = (double)merge->step[(int)(code + 0.5)], steps = noise / fmax(step, 1e-12);

@@ -52,6 +52,8 @@ void clt_merge_radiance(const clt_merge *merge, clt_image *radiance, clt_image *
 double clt_merge_variance(const clt_merge *merge, const clt_merge_sum *sum, double t, double e);
 /* The part of it that is less the more samples there are. */
 double clt_merge_noise(const clt_merge *merge, const clt_merge_sum *sum, double t, double e);
+/* Standard deviation, in radiance, of the part that they share, without light, by an exposure of t seconds. */
+double clt_merge_rounding(const clt_merge *merge, double t);
 /* The most by which that rate is off for a reason that all samples of the cell share, so that their number is no help:
  * rounding to steps of the camera, which noise of s steps dithers to at most exp(-2 pi^2 s^2) / 2 steps (Widrow and
  * Kollar, Quantization Noise, 2008), in the sample and in the black level; and noise that is cut off at code 0, whose

@@ -1,5 +1,6 @@
 #include "counterlight/rig.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 #include "base/memory.h"
@@ -7,6 +8,14 @@
 #include "rig/calibration.h"
 #include "rig/internal.h"
 #include "rig/timing/patch.h"
+
+static double find_longest(const clt_camera_rig *rig) {
+  double longest = 0;
+  for (int k = 0; k < rig->config.exposure_count; k++) {
+    longest = fmax(longest, rig->config.exposures_s[k]);
+  }
+  return longest;
+}
 
 static void describe_rig(const clt_rig *base, clt_rig_info *info) {
   const clt_camera_rig *rig = (const clt_camera_rig *)base;
@@ -23,7 +32,8 @@ static void describe_rig(const clt_rig *base, clt_rig_info *info) {
                          .torn = rig->torn,
                          .seconds = (double)rig->shots.last_ns * 1e-9,
                          .panel = &rig->config.projector,
-                         .panel_bits = rig->shots.panel.bits};
+                         .panel_bits = rig->shots.panel.bits,
+                         .rounding = clt_merge_rounding(&rig->merge, find_longest(rig))};
 }
 
 static void close_rig(clt_rig *base) {
