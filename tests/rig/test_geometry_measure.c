@@ -148,6 +148,35 @@ static void darkness_is_a_finding(void **state) {
   clt_geometry_finish(&geometry);
 }
 
+/* Half of the picture sees a second place of the panel by a mirror: told where that is as bright as to make pixels
+ * double, not where it is faint. */
+static void a_map_of_holes_is_a_finding(void **state) {
+  (void)state;
+  static world w;
+  static const double mirrors[] = {0.05, 0.8, 1.0};
+  for (size_t m = 0; m < sizeof mirrors / sizeof mirrors[0]; m++) {
+    clt_geometry geometry;
+    clt_findings findings = {0};
+    clt_error error = {0};
+    char counted[80];
+    int told = 0;
+    world_init(&w);
+    w.scene.light = 0.2;
+    w.scene.mirror = mirrors[m];
+    clt_geometry_options how = {.gray = w.gray};
+    assert_ok(measure(&w.projector, &w.camera, &how, &geometry, &findings, &error), error);
+    const long lit = SEEN_PIXELS - geometry.decode.count[CLT_PIXEL_UNLIT];
+    const double decoded = 100.0 * (double)geometry.decode.count[CLT_PIXEL_DECODED] / (double)lit;
+    snprintf(counted, sizeof counted, "only %.1f %% of the %ld lit pixels were decoded", decoded, lit);
+    for (int k = 0; k < findings.count; k++) {
+      told += findings.item[k].serious && strstr(findings.item[k].text, counted) != NULL;
+    }
+    assert_true(m == 0 ? decoded > 90 : decoded < 60);
+    assert_int_equal(told, m > 0);
+    clt_geometry_finish(&geometry);
+  }
+}
+
 /* Neighbouring columns and rows differ in one bit; each pair is a picture and its inverse; codes are unique. */
 static void pictures_are_a_gray_code(void **state) {
   (void)state;
@@ -184,6 +213,7 @@ int main(void) {
       cmocka_unit_test(a_replayed_measurement_gives_the_same_map),
       cmocka_unit_test(stopping_and_other_panels_end_it),
       cmocka_unit_test(darkness_is_a_finding),
+      cmocka_unit_test(a_map_of_holes_is_a_finding),
       cmocka_unit_test(pictures_are_a_gray_code),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -7,6 +7,7 @@
 enum { REGION_SHARE = 25000 }; /* part of the camera's pixels that a masked region is worth a line from */
 #define SATURATED_SHARE 0.01   /* of the lit pixels */
 #define AMBIGUOUS_SHARE 0.1
+#define DECODED_SHARE 0.6 /* of the lit pixels: below it much of the picture is not mapped */
 
 static clt_status show_and_take(clt_shots *shots, const clt_geometry_options *options, float *codes, clt_pairs *pairs,
                                 clt_error *error) {
@@ -48,6 +49,17 @@ static clt_status collect(clt_shots *shots, const clt_geometry_options *options,
   return status;
 }
 
+/* What most of the lit pixels are that were not decoded. */
+static clt_pixel_fate find_worst(const long count[CLT_PIXEL_FATES]) {
+  clt_pixel_fate worst = CLT_PIXEL_AMBIGUOUS;
+  for (clt_pixel_fate fate = 0; fate < CLT_PIXEL_FATES; fate++) {
+    if (fate != CLT_PIXEL_DECODED && fate != CLT_PIXEL_UNLIT && count[fate] > count[worst]) {
+      worst = fate;
+    }
+  }
+  return worst;
+}
+
 static void judge_map(const clt_geometry *geometry, clt_findings *findings) {
   const long *count = geometry->decode.count;
   long lit = 0;
@@ -60,6 +72,14 @@ static void judge_map(const clt_geometry *geometry, clt_findings *findings) {
                      "the panel's size",
                      lit);
     return;
+  }
+  if ((double)count[CLT_PIXEL_DECODED] < DECODED_SHARE * (double)lit) {
+    const clt_pixel_fate worst = find_worst(count);
+    clt_findings_add(findings, true,
+                     "only %.1f %% of the %ld lit pixels were decoded; %ld are %s: see the masked regions for where, "
+                     "expose longer, focus both lenses, and keep mirrors and other light out of the picture",
+                     100.0 * (double)count[CLT_PIXEL_DECODED] / (double)lit, lit, count[worst],
+                     clt_pixel_fate_name(worst));
   }
   if ((double)count[CLT_PIXEL_SATURATED] > SATURATED_SHARE * (double)lit) {
     clt_findings_add(findings, false, "%.1f %% of the lit pixels are saturated: expose shorter",
