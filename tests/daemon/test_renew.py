@@ -5,6 +5,9 @@ from exhibit import exhibit, main, wait_for
 from test_loop import RETRY, repaint, verified
 
 
+FIRST_PROGRESS = {"photometry": ("black", 8), "changed": ("black", 10), "geometry": ("structured light", 16)}
+
+
 def reacquire(run, scope):
     """What the measurement found, and the verification after it."""
     with run.client() as client:
@@ -13,7 +16,7 @@ def reacquire(run, scope):
         notes = client.until("showing", "holding")
     found = [n["params"] for n in notes if n["method"] == "reacquired"]
     made = [n["params"] for n in notes if n["method"] == "progress"]
-    assert made and made[0]["phase"] == "black" and made[0]["total"] == (8 if scope == "photometry" else 10), made
+    assert made and (made[0]["phase"], made[0]["total"]) == FIRST_PROGRESS[scope], made
     status = run.status()
     assert status["state"] == "showing" and found == [status["reacquired"]], (found, status)
     print(scope, found[0])
