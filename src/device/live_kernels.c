@@ -1,4 +1,5 @@
 #include "device/live_kernels.h"
+#include "base/variants.h"
 
 #include <math.h>
 #include <string.h>
@@ -223,10 +224,4 @@ const clt_live_row_kernels *const clt_live_row_variants[] = {&avx2, &portable, N
 const clt_live_row_kernels *const clt_live_row_variants[] = {&portable, NULL};
 #endif
 
-const clt_live_row_kernels *clt_live_row_choose(void) {
-  size_t k = 0;
-  while (!clt_live_row_variants[k]->runs_here()) {
-    k++;
-  }
-  return clt_live_row_variants[k];
-}
+CLT_CHOOSE(clt_live_row_choose, clt_live_row_kernels, clt_live_row_variants)

@@ -1,4 +1,5 @@
 #include "image/light_kernels.h"
+#include "base/variants.h"
 
 #include <string.h>
 
@@ -190,10 +191,4 @@ const clt_light_kernels *const clt_light_variants[] = {&bytes, &avx2, &portable,
 const clt_light_kernels *const clt_light_variants[] = {&portable, NULL};
 #endif
 
-const clt_light_kernels *clt_light_choose(void) {
-  size_t k = 0;
-  while (!clt_light_variants[k]->runs_here()) {
-    k++;
-  }
-  return clt_light_variants[k];
-}
+CLT_CHOOSE(clt_light_choose, clt_light_kernels, clt_light_variants)

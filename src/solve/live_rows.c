@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/variants.h"
 #include "solve/live_far.h"
 
 #define INLINE static inline __attribute__((always_inline)) /* into each variant */
@@ -465,10 +466,4 @@ const clt_live_kernels *const clt_live_variants[] = {&avx2, &portable, NULL};
 const clt_live_kernels *const clt_live_variants[] = {&portable, NULL};
 #endif
 
-const clt_live_kernels *clt_live_choose(void) {
-  size_t k = 0;
-  while (!clt_live_variants[k]->runs_here()) {
-    k++;
-  }
-  return clt_live_variants[k];
-}
+CLT_CHOOSE(clt_live_choose, clt_live_kernels, clt_live_variants)

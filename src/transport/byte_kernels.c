@@ -1,3 +1,4 @@
+#include "base/variants.h"
 #include "transport/kernels.h"
 
 /* 16 partial sums: lane l takes the codes l and l + 16 of every block. */
@@ -114,10 +115,4 @@ const clt_byte_kernels *const clt_byte_variants[] = {&avx2, &portable, NULL};
 const clt_byte_kernels *const clt_byte_variants[] = {&portable, NULL};
 #endif
 
-const clt_byte_kernels *clt_byte_choose(void) {
-  size_t k = 0;
-  while (!clt_byte_variants[k]->runs_here()) {
-    k++;
-  }
-  return clt_byte_variants[k];
-}
+CLT_CHOOSE(clt_byte_choose, clt_byte_kernels, clt_byte_variants)

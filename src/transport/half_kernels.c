@@ -1,6 +1,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/variants.h"
 #include "transport/kernels.h"
 
 /* Of a finite code: exponent and fraction move to where float has them; 2^112 makes up for the exponents' biases, of
@@ -134,10 +135,4 @@ const clt_half_kernels *const clt_half_variants[] = {&f16c, &portable, NULL};
 const clt_half_kernels *const clt_half_variants[] = {&portable, NULL};
 #endif
 
-const clt_half_kernels *clt_half_choose(void) {
-  size_t k = 0;
-  while (!clt_half_variants[k]->runs_here()) {
-    k++;
-  }
-  return clt_half_variants[k];
-}
+CLT_CHOOSE(clt_half_choose, clt_half_kernels, clt_half_variants)

@@ -1,6 +1,7 @@
 /* Sums and light over the leaves of a hierarchy. */
 #include <string.h>
 
+#include "base/variants.h"
 #include "transport/kernels.h"
 
 enum { LANES = 4 }; /* partial sums; a leaf is a few times as wide */
@@ -49,10 +50,4 @@ const clt_leaf_kernels *const clt_leaf_variants[] = {&avx2, &portable, NULL};
 const clt_leaf_kernels *const clt_leaf_variants[] = {&portable, NULL};
 #endif
 
-const clt_leaf_kernels *clt_leaf_choose(void) {
-  size_t k = 0;
-  while (!clt_leaf_variants[k]->runs_here()) {
-    k++;
-  }
-  return clt_leaf_variants[k];
-}
+CLT_CHOOSE(clt_leaf_choose, clt_leaf_kernels, clt_leaf_variants)

@@ -1,6 +1,7 @@
 /* Products with four columns both ways at once, each number read and converted once: what blocks storage is read by. */
 #include <string.h>
 
+#include "base/variants.h"
 #include "transport/kernels.h"
 
 enum {
@@ -121,10 +122,4 @@ const clt_pass_kernels *const clt_pass_variants[] = {&avx512, &avx2, &portable, 
 const clt_pass_kernels *const clt_pass_variants[] = {&portable, NULL};
 #endif
 
-const clt_pass_kernels *clt_pass_choose(void) {
-  size_t k = 0;
-  while (!clt_pass_variants[k]->runs_here()) {
-    k++;
-  }
-  return clt_pass_variants[k];
-}
+CLT_CHOOSE(clt_pass_choose, clt_pass_kernels, clt_pass_variants)

@@ -1,3 +1,4 @@
+#include "base/variants.h"
 #include "transport/kernels.h"
 
 /* Partial sums of a row, so that additions do not wait for each other. */
@@ -62,10 +63,4 @@ const clt_plain_kernels *const clt_plain_variants[] = {&avx2, &portable, NULL};
 const clt_plain_kernels *const clt_plain_variants[] = {&portable, NULL};
 #endif
 
-const clt_plain_kernels *clt_plain_choose(void) {
-  size_t k = 0;
-  while (!clt_plain_variants[k]->runs_here()) {
-    k++;
-  }
-  return clt_plain_variants[k];
-}
+CLT_CHOOSE(clt_plain_choose, clt_plain_kernels, clt_plain_variants)
