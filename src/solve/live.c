@@ -132,7 +132,7 @@ static clt_status measure_target(clt_live *live, const float *target, clt_error 
   const size_t cells = live->info.cols, slices = SLICES * (size_t)live->info.channels;
   double part[SLICES * CLT_CHANNELS_MAX], sum = 0;
   clt_turns turns = clt_turns_of(slices);
-#pragma omp parallel if (slices * cells >= WORTH_SHARING * SLICES)
+#pragma omp parallel if ((size_t)live->info.channels * cells >= WORTH_SHARING)
   for (size_t turn = 0; clt_turns_next(&turns, &turn);) {
     const size_t channel = turn / SLICES, first = cells * (turn % SLICES) / SLICES;
     const size_t end = cells * (turn % SLICES + 1) / SLICES;

@@ -231,8 +231,13 @@ INLINE void clear(clt_live_item *item) {
   item->residual = item->gap = 0;
 }
 
-/* Asks memory for the rows of a plane of every channel, or of one for all, over the item behind this one: they lie too
- * far apart to be foreseen. Into the second cache, for in the first they would push each other out. */
+/* The item that a thread most likely takes after this one. */
+INLINE const clt_live_item *next_item(const clt_far *far, const clt_live_item *item) {
+  return item + 1 < far->item + far->items ? item + 1 : item;
+}
+
+/* Asks memory for a plane's rows over an item to come, which lie too far apart to be foreseen; into the second cache,
+ * for in the first they would push each other out. */
 INLINE void foresee(const clt_far *far, const clt_live_item *item, const float *plane) {
   enum { LINE = 16, SECOND = 2 };
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
@@ -247,7 +252,7 @@ INLINE void foresee(const clt_far *far, const clt_live_item *item, const float *
 INLINE void pass(const clt_far *far, clt_live_item *item, bool aims) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
   const float *spill = far->spill != NULL ? far->spill + item->block * LANES : NULL;
-  const clt_live_item *next = &item[item + 1 < far->item + far->items];
+  const clt_live_item *next = next_item(far, item);
   double size = 0;
   clear(item);
   foresee(far, next, far->drive[far->now] + (size_t)next->channel * far->cells);
@@ -301,7 +306,7 @@ INLINE void move_row(const clt_far *far, const clt_live_item *item, const strip 
 
 INLINE void move(const clt_far *far, clt_live_item *item, float *next) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
-  const clt_live_item *behind = &item[item + 1 < far->item + far->items];
+  const clt_live_item *behind = next_item(far, item);
   memset(item->given, 0, sizeof item->given);
   item->light = 0;
   foresee(far, behind, far->drive[far->now] + (size_t)behind->channel * far->cells);

@@ -292,6 +292,7 @@ static void blocks_diagonal(const clt_transport *transport, int channel, double 
     diagonal[i] = (double)column_of(transport, channel, (size_t)own->block[i])[i];
   }
   loops all = begin_loops();
+#pragma omp parallel if (is_worth_sharing(transport))
   find_even(transport, &room, &all.even, diagonal, true);
   for (size_t i = 0; i < transport->rows; i++) {
     const int32_t a = own->block[i];

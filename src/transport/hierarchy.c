@@ -24,14 +24,15 @@ typedef struct plane {
 typedef struct product {
   const clt_transport *transport;
   int channel;
+  bool transposed, without_near;
   side from, to;
   plane weight, flood;
   const double *in;
   size_t in_step;
   double *out;
-  double *z, *chunks;              /* R + 1 sums over the leaves, and CLT_HIERARCHY_CHUNKS times as many */
-  double *leaf_sums, *part_sums;   /* CLT_LEAF_SUMS of each leaf and part */
-  double *leaf_light, *part_light; /* f: CLT_LEAF_TERMS of each */
+  double *z, *chunks;            /* R + 1 sums over the leaves, and CLT_HIERARCHY_CHUNKS times as many */
+  double *leaf_sums, *part_sums; /* CLT_LEAF_SUMS of each leaf and part */
+  double *leaf_light;            /* f: CLT_LEAF_TERMS of each */
 } product;
 
 static const float EVEN[CLT_LEAF_SIDE_MAX] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1,
@@ -62,7 +63,8 @@ static void rows_of(const float *factor, size_t leaf, size_t rank, const float *
 
 size_t clt_hierarchic_scratch(const clt_hierarchy_storage *own) {
   const size_t parts = own->spans.first_part[CLT_SLICES];
-  return (CLT_HIERARCHY_CHUNKS + 1) * (own->rank + 1) + (CLT_LEAF_SUMS + CLT_LEAF_TERMS) * (own->leaves + parts);
+  return (CLT_HIERARCHY_CHUNKS + 1) * (own->rank + 1) + CLT_LEAF_SUMS * (own->leaves + parts) +
+         CLT_LEAF_TERMS * own->leaves;
 }
 
 /* T in, or T' in; in turn with other products of the channel until end_turn. */
@@ -74,6 +76,7 @@ static product begin_turn(const clt_transport *transport, int channel, bool tran
   pthread_mutex_lock(&own->turn[channel]);
   product of = {.transport = transport,
                 .channel = channel,
+                .transposed = transposed,
                 .from = transposed ? scale : gather,
                 .to = transposed ? gather : scale,
                 .weight = transposed ? flood : even,
@@ -84,7 +87,6 @@ static product begin_turn(const clt_transport *transport, int channel, bool tran
   of.leaf_sums = of.chunks + CLT_HIERARCHY_CHUNKS * (own->rank + 1);
   of.part_sums = of.leaf_sums + CLT_LEAF_SUMS * own->leaves;
   of.leaf_light = of.part_sums + CLT_LEAF_SUMS * own->spans.first_part[CLT_SLICES];
-  of.part_light = of.leaf_light + CLT_LEAF_TERMS * own->leaves;
   return of;
 }
 
@@ -204,50 +206,46 @@ static void spread_slice(const product *of, size_t slice) {
                             .x_step = of->in_step,
                             .flood_step = of->flood.step,
                             .mean = of->z[own->rank] / (double)of->transport->cols,
-                            .f = of->part_light + CLT_LEAF_TERMS * spans->first_part[slice],
+                            .leaf = spans->leaf + spans->first_part[slice],
+                            .f = of->leaf_light,
                             .y = of->out};
-  for (size_t part = spans->first_part[slice]; part < spans->first_part[slice + 1]; part++) {
-    memcpy(of->part_light + CLT_LEAF_TERMS * part, of->leaf_light + CLT_LEAF_TERMS * (size_t)spans->leaf[part],
-           CLT_LEAF_TERMS * sizeof *of->part_light);
-  }
   clt_leaf_choose()->spread(&out, spans->span + spans->first_span[slice],
                             spans->first_span[slice + 1] - spans->first_span[slice]);
 }
 
+static void multiply(const product *of) {
+  const clt_near_stream *near = &((const clt_hierarchy_storage *)of->transport->storage)->near;
+  loops all = begin_loops();
+#pragma omp parallel if (of->transport->cols >= WORTH_SHARING)
+  {
+    size_t turn = 0;
+    light_leaves(of, &all);
+    while (clt_turns_next(&all.spread, &turn)) {
+      spread_slice(of, turn);
+      if (!of->transposed && !of->without_near) {
+        clt_near_stream_add(near, of->channel, turn, of->in, of->out);
+      }
+    }
+    if (of->transposed) {
+#pragma omp barrier
+      clt_near_stream_add_transposed(near, of->channel, all.near, of->in, of->out);
+    }
+  }
+}
+
 static void hierarchy_apply(const clt_transport *transport, int channel, const double *x, double *y) {
-  const clt_hierarchy_storage *own = transport->storage;
   product of = begin_turn(transport, channel, false);
   of.in = x;
   of.out = y;
-  loops all = begin_loops();
-#pragma omp parallel if (transport->cols >= WORTH_SHARING)
-  {
-    size_t turn = 0;
-    light_leaves(&of, &all);
-    while (clt_turns_next(&all.spread, &turn)) {
-      spread_slice(&of, turn);
-      clt_near_stream_add(&own->near, channel, turn, x, y);
-    }
-  }
+  multiply(&of);
   end_turn(&of);
 }
 
 static void hierarchy_apply_transposed(const clt_transport *transport, int channel, const double *y, double *x) {
-  const clt_hierarchy_storage *own = transport->storage;
   product of = begin_turn(transport, channel, true);
   of.in = y;
   of.out = x;
-  loops all = begin_loops();
-#pragma omp parallel if (transport->cols >= WORTH_SHARING)
-  {
-    size_t turn = 0;
-    light_leaves(&of, &all);
-    while (clt_turns_next(&all.spread, &turn)) {
-      spread_slice(&of, turn);
-    }
-#pragma omp barrier
-    clt_near_stream_add_transposed(&own->near, channel, all.near, y, x);
-  }
+  multiply(&of);
   end_turn(&of);
 }
 
@@ -288,31 +286,23 @@ static void hierarchy_diagonal(const clt_transport *transport, int channel, doub
   }
 }
 
-/* T 1. */
+/* T 1, near light by its rows. */
 static void hierarchy_row_sums(const clt_transport *transport, int channel, double *sums) {
   const clt_hierarchy_storage *own = transport->storage;
   const float *value = own->value + (size_t)channel * (size_t)own->start[transport->cols];
   product of = begin_turn(transport, channel, false);
+  of.without_near = true;
   of.in = EVEN_DRIVE;
   of.in_step = 0;
   of.out = sums;
-  loops all = begin_loops();
-#pragma omp parallel if (transport->cols >= WORTH_SHARING)
-  {
-    size_t turn = 0;
-    light_leaves(&of, &all);
-    while (clt_turns_next(&all.spread, &turn)) {
-      spread_slice(&of, turn);
-    }
-#pragma omp barrier
-#pragma omp for schedule(static)
-    for (size_t i = 0; i < transport->cols; i++) {
-      for (int64_t e = own->start[i]; e < own->start[i + 1]; e++) {
-        sums[i] += (double)value[e];
-      }
+  multiply(&of);
+  end_turn(&of);
+#pragma omp parallel for schedule(static) if (transport->cols >= WORTH_SHARING)
+  for (size_t i = 0; i < transport->cols; i++) {
+    for (int64_t e = own->start[i]; e < own->start[i + 1]; e++) {
+      sums[i] += (double)value[e];
     }
   }
-  end_turn(&of);
 }
 
 /* Spans are read twice. */

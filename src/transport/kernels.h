@@ -56,7 +56,8 @@ typedef struct clt_leaf_out {
   const float *own, *flood, *cells;
   size_t x_step, flood_step;
   double mean;
-  const double *f; /* parts x CLT_PLAIN_ROWS */
+  const int32_t *leaf; /* of each part */
+  const double *f;     /* leaves x CLT_PLAIN_ROWS */
   double *y;
 } clt_leaf_out;
 typedef struct clt_leaf_kernels {

@@ -3,18 +3,14 @@
 
 #include "base/variants.h"
 #include "transport/kernels.h"
+#include "transport/wide.h"
 
 enum { LANES = 4 }; /* partial sums; a leaf is a few times as wide */
-
-typedef double pair __attribute__((vector_size(2 * sizeof(double))));
-static inline pair take_portable(const float *at) {
-  return (pair){(double)at[0], (double)at[1]};
-}
 
 #define WIDE 2
 #define NAME(of) of##_portable
 #define FOR
-#define TAKE take_portable
+#define TAKE clt_take2
 #include "transport/leaf_loops.h"
 #undef WIDE
 #undef NAME
@@ -28,15 +24,10 @@ static bool runs_everywhere(void) {
 static const clt_leaf_kernels portable = {.runs_here = runs_everywhere, .sum = sum_portable, .spread = spread_portable};
 
 #if defined(__x86_64__)
-#include <immintrin.h>
-
 #define WIDE 4
 #define NAME(of) of##_avx2
-#define FOR __attribute__((target("avx2")))
-#define TAKE take_avx2
-FOR static inline __m256d take_avx2(const float *at) {
-  return _mm256_cvtps_pd(_mm_loadu_ps(at));
-}
+#define FOR CLT_AVX2
+#define TAKE clt_take4
 #include "transport/leaf_loops.h"
 
 static bool has_avx2(void) {

@@ -64,7 +64,7 @@ FOR static void NAME(spread)(const clt_leaf_out *out, const clt_span *span, size
     const size_t first = (size_t)span[s].first, count = span[s].count;
     const float *own = out->own + first, *flood = out->flood + first * out->flood_step, *cells = out->cells + first;
     const double *x = out->x + first * out->x_step, *u = out->place + span[s].u, v = out->place[span[s].v];
-    const double *f = out->f + CLT_PLAIN_ROWS * span[s].part;
+    const double *f = out->f + CLT_PLAIN_ROWS * out->leaf[span[s].part];
     const double even = f[0] + v * f[2], tilted = f[1] + v * f[3];
     double *y = out->y + first;
     size_t k = 0;

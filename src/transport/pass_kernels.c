@@ -3,6 +3,7 @@
 
 #include "base/variants.h"
 #include "transport/kernels.h"
+#include "transport/wide.h"
 
 enum {
   LINE = 16,  /* floats of a cache line */
@@ -31,28 +32,8 @@ static void pass_rest(const float *const column[CLT_PLAIN_ROWS], const double y[
   }
 }
 
-#if defined(__x86_64__)
-#include <immintrin.h>
-
-#define AVX2 __attribute__((target("avx2")))
-#define AVX512 __attribute__((target("avx512f,avx512vl")))
-
-AVX2 static inline __m256d take_avx2(const float *at) {
-  return _mm256_cvtps_pd(_mm_loadu_ps(at));
-}
-
-AVX512 static inline __m512d take_avx512(const float *at) {
-  return _mm512_cvtps_pd(_mm256_loadu_ps(at));
-}
-#endif
-
-typedef double pair __attribute__((vector_size(2 * sizeof(double))));
-static inline pair take_portable(const float *at) {
-  return (pair){(double)at[0], (double)at[1]};
-}
-
-/* One variant, in vectors of `wide` doubles, LANES / wide of which make up the partial sums of a column; AT_ONCE of
- * them for each time that memory is asked. */
+/* One variant, in vectors of `wide` doubles, LANES / wide of which make up the partial sums of a column. Memory is
+ * asked once for each cache line. */
 #define VARIANT(name, wide, attributes)                                                                                \
   typedef double wide_##name __attribute__((vector_size(wide * sizeof(double))));                                      \
   attributes static inline void step_##name(const float *const at[CLT_PLAIN_ROWS], const wide_##name *y, size_t k,     \
@@ -60,8 +41,8 @@ static inline pair take_portable(const float *at) {
     wide_##name in, to;                                                                                                \
     memcpy(&in, x + k, sizeof in);                                                                                     \
     memcpy(&to, out + k, sizeof to);                                                                                   \
-    const wide_##name a = take_##name(at[0] + k), b = take_##name(at[1] + k);                                          \
-    const wide_##name c = take_##name(at[2] + k), d = take_##name(at[3] + k);                                          \
+    const wide_##name a = clt_take##wide(at[0] + k), b = clt_take##wide(at[1] + k);                                    \
+    const wide_##name c = clt_take##wide(at[2] + k), d = clt_take##wide(at[3] + k);                                    \
     total[0] += a * in;                                                                                                \
     total[1] += b * in;                                                                                                \
     total[2] += c * in;                                                                                                \
@@ -109,13 +90,13 @@ VARIANT(portable, 2, )
 static bool has_avx2(void) {
   return __builtin_cpu_supports("avx2");
 }
-VARIANT(avx2, 4, AVX2)
+VARIANT(avx2, 4, CLT_AVX2)
 
 #define NEEDS_avx512 "AVX-512"
 static bool has_avx512(void) {
   return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl");
 }
-VARIANT(avx512, 8, AVX512)
+VARIANT(avx512, 8, CLT_AVX512)
 
 const clt_pass_kernels *const clt_pass_variants[] = {&avx512, &avx2, &portable, NULL};
 #else

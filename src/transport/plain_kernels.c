@@ -1,5 +1,6 @@
 #include "base/variants.h"
 #include "transport/kernels.h"
+#include "transport/wide.h"
 
 /* Partial sums of a row, so that additions do not wait for each other. */
 enum { LANES = 8 };
@@ -10,22 +11,14 @@ static double fold(const double *lane) {
 }
 
 #if defined(__x86_64__)
-#include <immintrin.h>
-
-#define AVX2 __attribute__((target("avx2")))
-
-AVX2 static inline __m256d take_floats(const float *at) {
-  return _mm256_cvtps_pd(_mm_loadu_ps(at));
-}
-
-AVX2 static inline __m256d take_doubles(const double *at) {
+CLT_AVX2 static inline __m256d take_doubles(const double *at) {
   return _mm256_loadu_pd(at);
 }
 #endif
 
 #define REAL float
 #define NAME(of) of##_float
-#define TAKE take_floats
+#define TAKE clt_take4
 #include "transport/plain_loops.h"
 #undef REAL
 #undef NAME

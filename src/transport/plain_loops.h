@@ -39,8 +39,8 @@ static void NAME(add_portable)(const REAL *const row[CLT_PLAIN_ROWS], const doub
 }
 
 #if defined(__x86_64__)
-AVX2 static void NAME(dot_avx2)(const REAL *const row[CLT_PLAIN_ROWS], const double *x, size_t count,
-                                double sum[CLT_PLAIN_ROWS]) {
+CLT_AVX2 static void NAME(dot_avx2)(const REAL *const row[CLT_PLAIN_ROWS], const double *x, size_t count,
+                                    double sum[CLT_PLAIN_ROWS]) {
   __m256d low[CLT_PLAIN_ROWS], high[CLT_PLAIN_ROWS];
   double lane[CLT_PLAIN_ROWS][LANES];
   size_t k = 0;
@@ -63,8 +63,8 @@ AVX2 static void NAME(dot_avx2)(const REAL *const row[CLT_PLAIN_ROWS], const dou
   NAME(dot_from)(row, x, k, count, lane, sum);
 }
 
-AVX2 static void NAME(add_avx2)(const REAL *const row[CLT_PLAIN_ROWS], const double y[CLT_PLAIN_ROWS], size_t count,
-                                double *x) {
+CLT_AVX2 static void NAME(add_avx2)(const REAL *const row[CLT_PLAIN_ROWS], const double y[CLT_PLAIN_ROWS], size_t count,
+                                    double *x) {
   const __m256d ya = _mm256_set1_pd(y[0]), yb = _mm256_set1_pd(y[1]);
   const __m256d yc = _mm256_set1_pd(y[2]), yd = _mm256_set1_pd(y[3]);
   size_t k = 0;

@@ -248,6 +248,7 @@ static void test_leaf_variants(void **unused) {
   static float own[CELLS], flood[CELLS], cells[CELLS];
   static double x[CELLS], y[2][CELLS], place[SIDE];
   clt_span span[SIDE];
+  const int32_t leaf[PARTS] = {1, 0};
   const double f[PARTS * 4] = {0.3, -0.7, 0.1, 1.1, 0.9, 0.2, -0.4, 0.05};
   double wanted[PARTS][CLT_LEAF_SUMS] = {{0}}, sums[2][PARTS * CLT_LEAF_SUMS] = {{0}};
   uint64_t state = 7;
@@ -272,7 +273,7 @@ static void test_leaf_variants(void **unused) {
     if (!clt_leaf_variants[v]->runs_here()) {
       continue;
     }
-    const clt_leaf_out out = {place, x, own, flood, cells, 1, 1, 0.6, f, y[1]};
+    const clt_leaf_out out = {place, x, own, flood, cells, 1, 1, 0.6, leaf, f, y[1]};
     memset(sums[1], 0, sizeof sums[1]);
     clt_leaf_variants[v]->sum(&in, span, SIDE, sums[1]);
     clt_leaf_variants[v]->spread(&out, span, SIDE);
@@ -288,7 +289,7 @@ static void test_leaf_variants(void **unused) {
     for (int s = 0; s < SIDE; s++) {
       for (int k = 0; k <= s; k++) {
         const int at = span[s].first + k;
-        const double u = place[SIDE - 1 - s + k], w = place[s], *g = f + 4 * (s % PARTS);
+        const double u = place[SIDE - 1 - s + k], w = place[s], *g = f + 4 * leaf[s % PARTS];
         const double light = g[0] + u * g[1] + w * g[2] + u * w * g[3];
         assert_near(y[1][at], (double)own[at] * x[at] + 0.6 * (double)flood[at] + (double)cells[at] * light, 1e-14);
       }
