@@ -34,6 +34,7 @@ enum {
   CLT_LIVE_AROUND = 8,
   CLT_LIVE_LANES = 8,
   CLT_LIVE_ROWS = 8, /* that a strip goes down before the one beside it is taken */
+  CLT_LIVE_CODES = CLT_LIVE_ROWS * CLT_LIVE_AROUND,
   CLT_LIVE_MOMENTS = 9
 }; /* of a weight over a leaf: the sums with u^a v^b, a and b 0..2, at [3 b + a] */
 
@@ -45,20 +46,14 @@ typedef struct clt_live_strip {
   int32_t pair[CLT_LIVE_LANES]; /* gather, black */
 } clt_live_strip;
 
-typedef enum clt_live_unit {
-  CLT_LIVE_GATHER,
-  CLT_LIVE_BLACK,
-  CLT_LIVE_FLOOD,
-  CLT_LIVE_NEAR,
-  CLT_LIVE_UNITS
-} clt_live_unit;
+typedef enum clt_live_unit { CLT_LIVE_GATHER, CLT_LIVE_BLACK, CLT_LIVE_SPILL, CLT_LIVE_UNITS } clt_live_unit;
 
 /* One channel of one leaf. */
 typedef struct clt_live_item {
   int channel;
   size_t leaf;
-  size_t first, block; /* its first strip of a row, and its first block of spill */
-  bool damped;         /* D is not `own` at every lit cell */
+  size_t first, block, code; /* its first strip of a row, block of spill and code */
+  bool damped;               /* D is not `own` at every lit cell */
   float unit[CLT_LIVE_UNITS];
   float far[CLT_LEAF_TERMS], pull[CLT_LEAF_TERMS], turn[CLT_LEAF_TERMS]; /* A z, B q, A dz over the leaf */
   float give[CLT_LEAF_TERMS], take[CLT_LEAF_TERMS];  /* the leaf's part of the right sides, before B' and A' */
@@ -107,16 +102,19 @@ struct clt_far {
   float *vectors;          /* that these lie in */
   float place[(CLT_LEAF_SIDE_MAX + 1) *
               CLT_LEAF_SIDE_MAX]; /* clt_leaf_place, of cell k at [CLT_LEAF_SIDE_MAX side + k] */
-  /* Light that `look` alone needs, lanes in pairs: of each strip of a row flood, and what spills over from the eight
-   * cells around a cell, by the directions (in reading order) that the strip has any from, which `around` tells. That
-   * is NULL where some near entries join cells that are no neighbours: then there is flood only. Drives have room for a
-   * row, a cell and a strip before and behind them. */
-  unsigned char *around;
+  /* Light that `look` alone needs, of each strip's rows that it goes down: flood, row by row, and near light that
+   * spills over from the eight cells around a cell, both in pairs of lanes. `code` has how many pairs of near light
+   * there are, and of each of both the row and the direction in reading order, CLT_LIVE_AROUND row + direction. Drives
+   * have room for a row, a cell and a strip before and behind them. */
   int32_t *spill;
-  const float *target;          /* of the frame */
-  bool open;                    /* no cell is taken to be held: a step from nothing goes for the unbounded drive */
-  int now, best;                /* of drive */
-  float mean[CLT_CHANNELS_MAX]; /* of the drive */
+  unsigned char *code;
+  size_t codes;                     /* in all items */
+  ptrdiff_t offset[CLT_LIVE_CODES]; /* of each code, from the strip's first cell to the one that spills */
+  bool scattered;                   /* some near entries join cells that are no neighbours: then spill is flood only */
+  const float *target;              /* of the frame */
+  bool open;                        /* no cell is taken to be held: a step from nothing goes for the unbounded drive */
+  int now, best;                    /* of drive */
+  float mean[CLT_CHANNELS_MAX];     /* of the drive */
   size_t lit[CLT_CHANNELS_MAX];
   size_t coupled[CLT_CHANNELS_MAX]; /* the first so many of the rank, which the factor couples */
   bool bound[CLT_CHANNELS_MAX];     /* some cells are held */
@@ -149,9 +147,12 @@ typedef struct clt_live_spot {
 static inline int32_t clt_live_across(const clt_leaf *leaf) {
   return (leaf->width + CLT_LIVE_LANES - 1) / CLT_LIVE_LANES;
 }
+static inline int32_t clt_live_rows_below(const clt_leaf *leaf, int32_t top) {
+  return leaf->height - top < CLT_LIVE_ROWS ? leaf->height - top : CLT_LIVE_ROWS;
+}
 static inline clt_live_spot clt_live_spot_of(const clt_leaf *leaf, int32_t number) {
   const int32_t each = CLT_LIVE_ROWS * clt_live_across(leaf), top = number / each * CLT_LIVE_ROWS;
-  const int32_t rows = leaf->height - top < CLT_LIVE_ROWS ? leaf->height - top : CLT_LIVE_ROWS;
+  const int32_t rows = clt_live_rows_below(leaf, top);
   return (clt_live_spot){top + number % each % rows, number % each / rows * CLT_LIVE_LANES};
 }
 

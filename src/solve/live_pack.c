@@ -104,96 +104,102 @@ static void pack_strips(clt_far *far, clt_live_item *item, const float *diagonal
   }
 }
 
-/* Which directions the lit cells of a strip have near light from. */
-static unsigned directions_of(const clt_far *far, strip at, const float *diagonal) {
+/* What spills over to some rows of a strip. */
+typedef struct spilled {
+  int32_t rows, count;                /* count: of codes that occur */
+  unsigned char code[CLT_LIVE_CODES]; /* direction by direction, so that a row is not added to twice at once */
+  float flood[CLT_LIVE_ROWS][LANES], near[CLT_LIVE_CODES][LANES]; /* near light by code */
+} spilled;
+
+/* The rows of a strip that begin with the item's number'th strip of a row. */
+static void find_spilled(const clt_far *far, const clt_live_item *item, int32_t number, const float *diagonal,
+                         spilled *found) {
   const clt_hierarchy_storage *own = far->hierarchy;
-  unsigned all = 0;
-  for (size_t i = at.cell; i < at.cell + (size_t)at.count; i++) {
-    for (int64_t e = own->start[i]; diagonal[i] > 0 && e < own->start[i + 1]; e++) {
-      all |= 1u << direction_of(far, i, (size_t)own->cell[e]);
-    }
-  }
-  return all;
-}
-
-static int32_t count_ones(unsigned bits) {
-  int32_t count = 0;
-  for (; bits != 0; bits &= bits - 1) {
-    count++;
-  }
-  return count;
-}
-
-/* What spills over to a strip of a row: lanes of flood, and of each direction that it has near light from. */
-typedef struct spill_lanes {
-  float of[(1 + CLT_LIVE_AROUND) * LANES];
-  int32_t count; /* of lanes */
-} spill_lanes;
-
-static spill_lanes spill_of(const clt_far *far, const clt_live_item *item, int32_t number, const float *diagonal) {
-  const clt_hierarchy_storage *own = far->hierarchy;
+  const clt_leaf *leaf = leaf_of(far, item);
   const float *flood = own->flood + (size_t)item->channel * far->cells;
   const float *value = own->value + (size_t)item->channel * (size_t)own->start[far->cells];
-  const strip at = strip_of(far, leaf_of(far, item), number);
-  const unsigned around = far->around != NULL ? far->around[item->first + (size_t)number] : 0;
-  spill_lanes spill = {.count = LANES * (1 + count_ones(around))};
-  for (int32_t l = 0; l < at.count; l++) {
-    const size_t i = at.cell + (size_t)l;
-    spill.of[l] = diagonal[i] > 0 ? flood[i] : 0;
-    for (int64_t e = own->start[i]; far->around != NULL && diagonal[i] > 0 && e < own->start[i + 1]; e++) {
-      const unsigned direction = 1u << direction_of(far, i, (size_t)own->cell[e]);
-      spill.of[(1 + count_ones(around & (direction - 1))) * LANES + l] += value[e];
-    }
-  }
-  return spill;
-}
-
-static void measure_spill(const clt_far *far, clt_live_item *item, const float *diagonal) {
-  float flood = 0, near = 0;
-  for (int32_t number = 0; number < strips_of(leaf_of(far, item)); number++) {
-    const spill_lanes spill = spill_of(far, item, number, diagonal);
-    for (int32_t k = 0; k < spill.count; k++) {
-      float *most = k < LANES ? &flood : &near;
-      *most = fmaxf(*most, fabsf(spill.of[k]));
-    }
-  }
-  item->unit[CLT_LIVE_FLOOD] = unit_for(flood);
-  item->unit[CLT_LIVE_NEAR] = unit_for(near);
-}
-
-static void pack_spill(clt_far *far, clt_live_item *item, const float *diagonal) {
-  int32_t *to = far->spill + item->block * LANES;
-  measure_spill(far, item, diagonal);
-  for (int32_t number = 0; number < strips_of(leaf_of(far, item)); number++) {
-    const spill_lanes spill = spill_of(far, item, number, diagonal);
-    for (int32_t k = 0; k < spill.count; k += 2 * LANES) {
-      const float unit = item->unit[k < LANES ? CLT_LIVE_FLOOD : CLT_LIVE_NEAR];
-      for (int32_t l = k; l < k + LANES; l++) {
-        const bool paired = l + LANES < spill.count;
-        *to++ = pair_of(whole(spill.of[l], unit), paired ? whole(spill.of[l + LANES], item->unit[CLT_LIVE_NEAR]) : 0);
+  bool occurs[CLT_LIVE_CODES] = {false};
+  *found = (spilled){.rows = clt_live_rows_below(leaf, clt_live_spot_of(leaf, number).row)};
+  for (int32_t k = 0; k < found->rows * LANES; k++) {
+    const strip at = strip_of(far, leaf, number + k / LANES);
+    const size_t i = at.cell + (size_t)(k % LANES);
+    if (k % LANES < at.count && diagonal[i] > 0) {
+      found->flood[k / LANES][k % LANES] = flood[i];
+      for (int64_t e = own->start[i]; !far->scattered && e < own->start[i + 1]; e++) {
+        const int32_t code = k / LANES * CLT_LIVE_AROUND + direction_of(far, i, (size_t)own->cell[e]);
+        found->near[code][k % LANES] += value[e];
+        occurs[code] = true;
       }
     }
   }
+  for (int32_t k = 0; k < CLT_LIVE_CODES; k++) {
+    const int32_t code = k % CLT_LIVE_ROWS * CLT_LIVE_AROUND + k / CLT_LIVE_ROWS;
+    if (occurs[code]) {
+      found->code[found->count++] = (unsigned char)code;
+    }
+  }
 }
 
-/* Finds where every item's strips and blocks begin, and how many there are. */
+static int32_t pairs_of(int32_t count) {
+  return (count + 1) / 2;
+}
+
+/* Finds where an item's spill begins and its unit; from there on the next one's. */
+static void measure_spill(clt_far *far, clt_live_item *item, const float *diagonal) {
+  const clt_leaf *leaf = leaf_of(far, item);
+  float most = 0;
+  spilled found;
+  item->block = far->blocks;
+  item->code = far->codes;
+  for (int32_t number = 0; number < strips_of(leaf); number += found.rows) {
+    find_spilled(far, item, number, diagonal, &found);
+    for (int32_t k = 0; k < LANES * (found.rows + found.count); k++) {
+      const int32_t row = k / LANES, lane = k % LANES;
+      most = fmaxf(most,
+                   fabsf(row < found.rows ? found.flood[row][lane] : found.near[found.code[row - found.rows]][lane]));
+    }
+    far->blocks += (size_t)(pairs_of(found.rows) + pairs_of(found.count));
+    far->codes += (size_t)(1 + 2 * pairs_of(found.count));
+  }
+  item->unit[CLT_LIVE_SPILL] = unit_for(most);
+}
+
+/* Lanes of two; lower may be NULL. */
+static int32_t *put_pair(int32_t *to, float unit, const float *upper, const float *lower) {
+  for (int32_t l = 0; l < LANES; l++) {
+    *to++ = pair_of(whole(upper[l], unit), lower != NULL ? whole(lower[l], unit) : 0);
+  }
+  return to;
+}
+
+static void pack_spill(clt_far *far, const clt_live_item *item, const float *diagonal) {
+  const clt_leaf *leaf = leaf_of(far, item);
+  const float unit = item->unit[CLT_LIVE_SPILL];
+  int32_t *to = far->spill + item->block * LANES;
+  unsigned char *code = far->code + item->code;
+  spilled found;
+  for (int32_t number = 0; number < strips_of(leaf); number += found.rows) {
+    find_spilled(far, item, number, diagonal, &found);
+    for (int32_t row = 0; row < found.rows; row += 2) {
+      to = put_pair(to, unit, found.flood[row], row + 1 < found.rows ? found.flood[row + 1] : NULL);
+    }
+    *code++ = (unsigned char)pairs_of(found.count);
+    for (int32_t k = 0; k < found.count; k += 2, code += 2) {
+      const bool paired = k + 1 < found.count;
+      code[0] = found.code[k];
+      code[1] = paired ? found.code[k + 1] : 0;
+      to = put_pair(to, unit, found.near[code[0]], paired ? found.near[code[1]] : NULL);
+    }
+  }
+}
+
 static void find_places(clt_far *far, const float *diagonal) {
-  size_t strips = 0, blocks = 0;
   for (size_t k = 0; k < far->items; k++) {
     clt_live_item *item = &far->item[k];
-    const clt_leaf *leaf = leaf_of(far, item);
-    item->first = strips;
-    item->block = blocks;
-    for (int32_t number = 0; number < strips_of(leaf); number++, strips++) {
-      unsigned around = 0;
-      if (far->around != NULL) {
-        around = directions_of(far, strip_of(far, leaf, number), diagonal + (size_t)item->channel * far->cells);
-        far->around[strips] = (unsigned char)around;
-      }
-      blocks += (size_t)(2 + count_ones(around)) / 2;
-    }
+    item->first = far->strips;
+    far->strips += (size_t)strips_of(leaf_of(far, item));
+    measure_spill(far, item, diagonal + (size_t)item->channel * far->cells);
   }
-  far->blocks = blocks;
 }
 
 /* Whether D is something else than `own` at any lit cell of an item. */
@@ -255,23 +261,16 @@ static clt_status reserve(clt_far *far, const float *diagonal, clt_error *error)
   const bool scaled = is_scaled(far), damped = any_is_damped(far, diagonal);
   far->strip = clt_alloc(far->strips, sizeof *far->strip);
   far->spill = clt_alloc(far->blocks, LANES * sizeof *far->spill);
+  far->code = clt_alloc(far->codes, 1);
   far->vectors = clt_alloc(lanes + 3 * drive, sizeof *far->vectors);
   far->scale = scaled ? clt_alloc(lanes, sizeof *far->scale) : NULL;
   far->diagonal = damped ? clt_alloc(lanes, sizeof *far->diagonal) : NULL;
-  if (far->strip == NULL || far->spill == NULL || far->vectors == NULL || (scaled && far->scale == NULL) ||
-      (damped && far->diagonal == NULL)) {
+  if (far->strip == NULL || far->spill == NULL || far->code == NULL || far->vectors == NULL ||
+      (scaled && far->scale == NULL) || (damped && far->diagonal == NULL)) {
     return fail(far, error);
   }
   place_drives(far, margin, drive);
   return CLT_OK;
-}
-
-static size_t count_strips(const clt_far *far) {
-  size_t strips = 0;
-  for (size_t k = 0; k < far->items; k++) {
-    strips += (size_t)strips_of(leaf_of(far, &far->item[k]));
-  }
-  return strips;
 }
 
 static void tabulate_places(clt_far *far) {
@@ -280,16 +279,16 @@ static void tabulate_places(clt_far *far) {
       far->place[CLT_LEAF_SIDE_MAX * side + k] = (float)clt_leaf_place(k, side);
     }
   }
+  for (int32_t code = 0; code < CLT_LIVE_CODES; code++) {
+    const int32_t direction = code % CLT_LIVE_AROUND, place = direction + (direction >= CLT_LIVE_AROUND / 2);
+    far->offset[code] = (ptrdiff_t)(code / CLT_LIVE_AROUND + place / 3 - 1) * far->width + place % 3 - 1;
+  }
 }
 
 clt_status clt_live_pack(clt_far *far, const float *diagonal, const float *const *black, clt_error *error) {
-  const bool near = joins_neighbours(far);
+  far->scattered = !joins_neighbours(far);
+  far->strips = far->blocks = far->codes = 0;
   tabulate_places(far);
-  far->strips = count_strips(far);
-  far->around = near ? clt_alloc(far->strips, 1) : NULL;
-  if (near && far->around == NULL) {
-    return fail(far, error);
-  }
   find_places(far, diagonal);
   const clt_status status = reserve(far, diagonal, error);
   for (size_t k = 0; status == CLT_OK && k < far->items; k++) {
@@ -309,6 +308,6 @@ void clt_live_unpack(clt_far *far) {
   free(far->scale);
   free(far->diagonal);
   free(far->vectors);
-  free(far->around);
+  free(far->code);
   free(far->spill);
 }

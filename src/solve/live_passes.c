@@ -39,7 +39,7 @@ bool clt_live_time_passes(clt_live *live, const float *target, clt_live_pass pas
   const double scale = far->scale != NULL ? (double)far->strips * CLT_LIVE_LANES * sizeof *far->scale : 0;
   const double constant = (double)far->strips * sizeof *far->strip + scale;
   const double factor = channels * CLT_LEAF_TERMS * (double)far->hierarchy->leaves * (double)far->rank * sizeof(float);
-  const double spill = (double)far->blocks * CLT_LIVE_LANES * sizeof *far->spill + (double)far->strips;
+  const double spill = (double)far->blocks * CLT_LIVE_LANES * sizeof *far->spill + (double)far->codes;
   far->target = target;
   pass[CLT_LIVE_PASS_AIM] = (clt_live_pass){"frame: aim", constant + shown + 2 * plane, 0};
   pass[CLT_LIVE_PASS_MOVE] = (clt_live_pass){"frame: move", constant + shown + 3 * plane, 0};

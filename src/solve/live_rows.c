@@ -69,9 +69,9 @@ typedef struct strip {
 /* Strips are taken in the order in which they are packed: the first of an item, and the one after each. */
 INLINE void begin_strip(const clt_far *far, const clt_live_item *item, const clt_leaf *leaf, int32_t top,
                         int32_t across, strip *s) {
-  const int32_t left = leaf->width - across, below = leaf->height - top;
+  const int32_t left = leaf->width - across;
   s->row = top;
-  s->end = top + (below < CLT_LIVE_ROWS ? below : CLT_LIVE_ROWS);
+  s->end = top + clt_live_rows_below(leaf, top);
   s->count = left < LANES ? left : LANES;
   s->at =
       (size_t)item->channel * far->cells + (size_t)(leaf->y + top) * (size_t)far->width + (size_t)(leaf->x + across);
@@ -130,19 +130,19 @@ typedef struct view {
   const clt_live_strip *strip;
   const float *scale, *diagonal, *x, *target; /* scale and diagonal may be NULL; the last two lie as pictures */
   float *shown;
-  const unsigned char *around;
   const int32_t *spill;
+  const unsigned char *code;
   const float *places; /* of rows */
   size_t width;
-  int32_t bounded; /* marks that are set where bounds hold */
-  float black, near, flood;
+  int32_t bounded;         /* marks that are set where bounds hold */
+  float black, unit, mean; /* units of black and of spill; and the drive's mean */
   float far[CLT_LEAF_TERMS], pull[CLT_LEAF_TERMS], turn[CLT_LEAF_TERMS];
   bool pulled; /* pull is not 0 */
-  ptrdiff_t offset[CLT_LIVE_AROUND];
+  const ptrdiff_t *offset;
+  bool scattered;
 } view;
 
 INLINE void see(const clt_far *far, const clt_live_item *item, const clt_leaf *leaf, view *w) {
-  const ptrdiff_t line = far->width;
   const float *pull = item->pull, gather = item->unit[CLT_LIVE_GATHER];
   *w = (view){.strip = far->strip,
               .scale = far->scale,
@@ -150,16 +150,17 @@ INLINE void see(const clt_far *far, const clt_live_item *item, const clt_leaf *l
               .x = far->drive[far->now],
               .target = far->target,
               .shown = far->shown,
-              .around = far->around,
               .spill = far->spill + item->block * LANES,
+              .code = far->code + item->code,
               .places = far->place + CLT_LEAF_SIDE_MAX * leaf->height,
               .width = (size_t)far->width,
               .bounded = far->open ? 0 : -1,
               .black = item->unit[CLT_LIVE_BLACK],
-              .near = item->unit[CLT_LIVE_NEAR],
-              .flood = item->unit[CLT_LIVE_FLOOD] * far->mean[item->channel],
+              .unit = item->unit[CLT_LIVE_SPILL],
+              .mean = far->mean[item->channel],
               .pulled = pull[0] != 0 || pull[1] != 0 || pull[2] != 0 || pull[3] != 0,
-              .offset = {-line - 1, -line, -line + 1, -1, 1, line - 1, line, line + 1}};
+              .offset = far->offset,
+              .scattered = far->scattered};
   for (int t = 0; t < CLT_LEAF_TERMS; t++) {
     w->far[t] = item->far[t];
     w->turn[t] = item->turn[t];
@@ -173,27 +174,34 @@ INLINE void next_row(const view *w, strip *s) {
   s->place++;
 }
 
-/* near = O x over a strip of a row, whose first pair of spill, of flood, has been taken; the rest is taken too. */
-INLINE void add_spill(view *w, const strip *s, const marks *first, lanes *near) {
+/* What spills over to the rows that a strip is about to go down, as a multiple of the unit: flood, and near light O x.
+ */
+INLINE void take_spill(view *w, const strip *s, lanes spill[CLT_LIVE_ROWS]) {
   const float *x = w->x + s->at;
-  marks pair = *first;
-  bool lower = true;
-  for (unsigned around = w->around[s->place]; around != 0; around &= around - 1, lower = !lower) {
-    lanes share, light;
-    if (lower) {
-      take_lower(&share, &pair);
-    } else {
-      memcpy(&pair, w->spill, sizeof pair);
-      w->spill += LANES;
-      take_upper(&share, &pair);
-    }
-    take(&light, x + w->offset[__builtin_ctz(around)]);
-    *near += share * light;
+  for (int32_t row = 0; row < s->end - s->row; row += 2, w->spill += LANES) {
+    marks pair;
+    memcpy(&pair, w->spill, sizeof pair);
+    take_upper(&spill[row], &pair);
+    take_lower(&spill[row + 1], &pair);
+    spill[row] *= w->mean;
+    spill[row + 1] *= w->mean;
   }
-  *near *= w->near;
+  const unsigned char *code = w->code + 1, *end = code + 2 * *w->code;
+  for (; code < end; code += 2, w->spill += LANES) {
+    marks pair;
+    lanes upper, lower, from, beside;
+    memcpy(&pair, w->spill, sizeof pair);
+    take_upper(&upper, &pair);
+    take_lower(&lower, &pair);
+    take(&from, x + w->offset[code[0]]);
+    take(&beside, x + w->offset[code[1]]);
+    spill[code[0] / CLT_LIVE_AROUND] += upper * from;
+    spill[code[1] / CLT_LIVE_AROUND] += lower * beside;
+  }
+  w->code = end;
 }
 
-/* The same where near light comes from anywhere. */
+/* near = O x over a strip of a row where it comes from anywhere. */
 INLINE void add_near(const clt_far *far, const clt_live_item *item, const strip *s, lanes *near) {
   const clt_hierarchy_storage *own = far->hierarchy;
   const size_t base = (size_t)item->channel * far->cells;
@@ -306,20 +314,14 @@ INLINE void aim_row(const view *w, const strip *s, const cells *c, look_sums *su
 }
 
 /* The light of the drive over a strip of a row, and r from it; the far light is bilinear along it. */
-INLINE void look_row(const clt_far *far, const clt_live_item *item, view *w, const strip *s, const cells *c, float v,
-                     look_sums *sums, lanes *r) {
-  lanes target, flood, wanted, light, near = {0};
-  marks pair;
-  memcpy(&pair, w->spill, sizeof pair);
-  w->spill += LANES;
-  take_upper(&flood, &pair);
-  if (w->around != NULL) {
-    add_spill(w, s, &pair, &near);
-  } else {
+INLINE void look_row(const clt_far *far, const clt_live_item *item, const view *w, const strip *s, const cells *c,
+                     float v, const lanes *spill, look_sums *sums, lanes *r) {
+  lanes target, wanted, light, near = {0};
+  if (w->scattered) {
     add_near(far, item, s, &near);
   }
   spread(&light, w->far, v, &s->u);
-  light = c->own * c->x + near + c->scale * light + w->flood * flood;
+  light = c->own * c->x + (near + w->unit * *spill) + c->scale * light;
   light = (lanes)((marks)light & c->lit);
   memcpy(w->shown + s->place * LANES, &light, sizeof light);
   want(w, s, c, &target, &wanted);
@@ -373,7 +375,12 @@ INLINE void pass(const clt_far *far, clt_live_item *item, bool aims) {
     foresee(far, next, w.target, top, foreseen(&leaf, top));
     for (int32_t across = 0; across < leaf.width; across += LANES) {
       look_columns down = {0};
-      for (begin_strip(far, item, &leaf, top, across, &s); s.row < s.end; next_row(&w, &s)) {
+      lanes spill[CLT_LIVE_ROWS];
+      begin_strip(far, item, &leaf, top, across, &s);
+      if (!aims) {
+        take_spill(&w, &s, spill);
+      }
+      for (; s.row < s.end; next_row(&w, &s)) {
         const float v = w.places[s.row];
         cells c;
         lanes r;
@@ -381,7 +388,7 @@ INLINE void pass(const clt_far *far, clt_live_item *item, bool aims) {
         if (aims) {
           aim_row(&w, &s, &c, &sums, &r);
         } else {
-          look_row(far, item, &w, &s, &c, v, &sums, &r);
+          look_row(far, item, &w, &s, &c, v, &spill[s.row - top], &sums, &r);
         }
         judge(&w, &s, &c, v, &r, &down, &sums);
       }
@@ -578,7 +585,14 @@ static bool has_avx2(void) {
 #define NEEDS_avx2 "AVX2"
 VARIANT(avx2, __attribute__((target("avx2"))))
 
-const clt_live_kernels *const clt_live_variants[] = {&avx2, &portable, NULL};
+static bool has_avx512(void) {
+  return __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq");
+}
+
+#define NEEDS_avx512 "AVX-512"
+VARIANT(avx512, __attribute__((target("avx512f,avx512vl,avx512dq,prefer-vector-width=256"))))
+
+const clt_live_kernels *const clt_live_variants[] = {&avx512, &avx2, &portable, NULL};
 #else
 const clt_live_kernels *const clt_live_variants[] = {&portable, NULL};
 #endif
