@@ -55,11 +55,35 @@ INLINE void put_part(float *to, const lanes *from, int32_t count) {
   }
 }
 
+/* Comparisons go by the bits, whose order as whole numbers is that of floats from 0 on: compilers take comparisons of
+ * floats apart, lane by lane, where vectors are longer than the processor's. */
+INLINE void mark_negative(marks *to, const unsigned_marks *bits) {
+  *to = (marks)*bits >> 31;
+}
+
+/* Where a value of 0 or more is not 0. */
+INLINE void mark_positive(marks *to, const lanes *value) {
+  const unsigned_marks below = 0 - (unsigned_marks)*value;
+  mark_negative(to, &below);
+}
+
+/* Where a value is 0 or less, or 1 or more. */
+INLINE void mark_beyond(marks *to, const lanes *value) {
+  const lanes one = (lanes){0} + 1;
+  const unsigned_marks bits = (unsigned_marks)*value, most = (unsigned_marks)one - 1;
+  const unsigned_marks beyond = bits | (bits - 1) | (most - bits);
+  mark_negative(to, &beyond);
+}
+
 INLINE void clip(lanes *value) {
-  const lanes none = {0}, one = none + 1;
-  *value = (lanes)((marks)*value & (*value > none));
-  const marks below = *value < one;
-  *value = (lanes)(((marks)*value & below) | ((marks)one & ~below));
+  const lanes one = (lanes){0} + 1;
+  const unsigned_marks sign = (unsigned_marks)*value;
+  marks low, high;
+  mark_negative(&low, &sign);
+  const marks rest = (marks)*value & ~low;
+  const unsigned_marks above = (unsigned_marks)one - (unsigned_marks)rest;
+  mark_negative(&high, &above);
+  *value = (lanes)((rest & ~high) | ((marks)one & high));
 }
 
 /* A strip of an item on its way down some rows. */
@@ -227,7 +251,7 @@ typedef struct cells {
 } cells;
 
 INLINE void take_cells(const view *w, const strip *s, cells *c) {
-  const lanes none = {0}, one = none + 1;
+  const lanes one = (lanes){0} + 1;
   const clt_live_strip *constant = &w->strip[s->place];
   marks pair;
   memcpy(&pair, constant->pair, sizeof pair);
@@ -239,7 +263,7 @@ INLINE void take_cells(const view *w, const strip *s, cells *c) {
   if (w->diagonal != NULL) {
     take(&diagonal, w->diagonal + s->place * LANES);
   }
-  c->lit = diagonal > none;
+  mark_positive(&c->lit, &diagonal);
   c->inverse = (lanes)((marks)(one / diagonal) & c->lit);
   c->scale = one;
   if (w->scale != NULL) {
@@ -272,11 +296,11 @@ INLINE void add_pull(const view *w, const strip *s, const cells *c, float v, lan
 
 /* The drive to which a cell would go from r, and where it is held at a bound. */
 INLINE void wish_for(const view *w, const strip *s, const cells *c, float v, const lanes *r, lanes *wish, marks *held) {
-  const lanes none = {0}, one = none + 1;
   lanes by = *r;
   add_pull(w, s, c, v, &by);
   *wish = c->x + c->inverse * by;
-  *held = ((*wish <= none) | (*wish >= one)) & c->lit & w->bounded;
+  mark_beyond(held, wish);
+  *held &= c->lit & w->bounded;
 }
 
 #endif
