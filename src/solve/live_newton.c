@@ -70,9 +70,9 @@ static void sum_items(const clt_far *far, const clt_leaf_rows *rows, size_t offs
   }
 }
 
-/* The columns that are coupled, as whole blocks. */
-static size_t coupled_blocks(const clt_far *far, int channel) {
-  const size_t whole = clt_leaf_rows_blocks(far->coupled[channel]) * CLT_BLOCK;
+/* The columns that are coupled, in whole steps. */
+static size_t coupled_steps(const clt_far *far, int channel) {
+  const size_t whole = (far->coupled[channel] + CLT_RANK_STEP - 1) / CLT_RANK_STEP * CLT_RANK_STEP;
   return whole < far->rank ? whole : far->rank;
 }
 
@@ -137,7 +137,7 @@ void clt_newton_step(clt_far *far) {
     const int channel = k % far->channels;
     const size_t chunk = (size_t)(k / far->channels);
     float *partial = partial_of(far, channel, chunk);
-    sum_chunk(far, channel, chunk, &of->right, coupled_blocks(far, channel), offsetof(clt_live_item, give), partial);
+    sum_chunk(far, channel, chunk, &of->right, coupled_steps(far, channel), offsetof(clt_live_item, give), partial);
     if (far->pulled[channel]) {
       sum_chunk(far, channel, chunk, &of->left, far->rank, offsetof(clt_live_item, take), partial + far->rank);
     }
@@ -152,7 +152,7 @@ void clt_newton_turn(const clt_far *far, clt_live_item *item) {
   const clt_hierarchy_storage *of = far->hierarchy;
   const int channel = item->channel;
   clt_leaf_rows_dot(&of->left, channel, item->leaf, of_channel(far->turned, far->rank, channel),
-                    of->core != NULL ? far->rank : coupled_blocks(far, channel), item->turn);
+                    of->core != NULL ? far->rank : coupled_steps(far, channel), item->turn);
   if (far->pulled[channel]) {
     clt_leaf_rows_dot(&of->right, channel, item->leaf, of_channel(far->q, far->rank, channel), far->rank, item->pull);
   } else {

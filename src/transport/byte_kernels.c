@@ -64,8 +64,9 @@ static void dots_portable(const int8_t *const code[4], const float *const scale[
 static void add_from(const int8_t *const code[4], const float *const scale[4], const float y[4], size_t done,
                      size_t count, float *x) {
   const int8_t *a = code[0], *b = code[1], *c = code[2], *d = code[3];
-  for (size_t first = done; first < count; first += CLT_BLOCK) {
-    const size_t block = first / CLT_BLOCK, end = first + CLT_BLOCK < count ? first + CLT_BLOCK : count;
+  for (size_t first = done, end; first < count; first = end) {
+    const size_t block = first / CLT_BLOCK;
+    end = (block + 1) * CLT_BLOCK < count ? (block + 1) * CLT_BLOCK : count;
     const float sa = y[0] * scale[0][block], sb = y[1] * scale[1][block];
     const float sc = y[2] * scale[2][block], sd = y[3] * scale[3][block];
     for (size_t k = first; k < end; k++) {
@@ -144,12 +145,12 @@ AVX2 static void dots_avx2(const int8_t *const code[4], const float *const scale
 
 AVX2 static void add_avx2(const int8_t *const code[4], const float *const scale[4], const float y[4], size_t count,
                           float *x) {
-  size_t first = 0;
-  for (; first + CLT_BLOCK <= count; first += CLT_BLOCK) {
-    const size_t block = first / CLT_BLOCK;
+  size_t k = 0;
+  while (k + 8 <= count) {
+    const size_t block = k / CLT_BLOCK, end = (block + 1) * CLT_BLOCK < count ? (block + 1) * CLT_BLOCK : count;
     const __m256 sa = _mm256_set1_ps(y[0] * scale[0][block]), sb = _mm256_set1_ps(y[1] * scale[1][block]);
     const __m256 sc = _mm256_set1_ps(y[2] * scale[2][block]), sd = _mm256_set1_ps(y[3] * scale[3][block]);
-    for (size_t k = first; k < first + CLT_BLOCK; k += 8) {
+    for (; k + 8 <= end; k += 8) {
       __m256 front =
           _mm256_add_ps(_mm256_mul_ps(sa, take_bytes(code[0] + k)), _mm256_mul_ps(sb, take_bytes(code[1] + k)));
       __m256 back =
@@ -157,7 +158,7 @@ AVX2 static void add_avx2(const int8_t *const code[4], const float *const scale[
       _mm256_storeu_ps(x + k, _mm256_add_ps(_mm256_loadu_ps(x + k), _mm256_add_ps(front, back)));
     }
   }
-  add_from(code, scale, y, first, count, x);
+  add_from(code, scale, y, k, count, x);
 }
 
 static const clt_byte_kernels avx2 = {

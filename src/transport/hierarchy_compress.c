@@ -98,13 +98,13 @@ static bool decompose(work *job, size_t channel, clt_singular *of) {
   return true;
 }
 
-/* How many singular values must stay; a whole number of blocks where there are so many. */
+/* How many singular values must stay; a whole number of steps where there are so many. */
 static size_t rank_needed(const clt_singular *of, double tolerance) {
   size_t needed = of->count;
   while (needed > 1 && of->value[needed - 1] <= tolerance) {
     needed--;
   }
-  const size_t whole = (needed + STEP - 1) / STEP * STEP;
+  const size_t whole = (needed + CLT_RANK_STEP - 1) / CLT_RANK_STEP * CLT_RANK_STEP;
   return whole < of->count ? whole : of->count;
 }
 
@@ -164,8 +164,8 @@ static clt_status write_all(const work *job, clt_hierarchy_storage *own, const c
     rank = needed > rank ? needed : rank;
   }
   clt_shared shared;
-  clt_status status =
-      clt_singular_share(of, channels, tolerance, STEP, rank_worth(job->nodes, channels, rank), &shared, error);
+  clt_status status = clt_singular_share(of, channels, tolerance, CLT_RANK_STEP, rank_worth(job->nodes, channels, rank),
+                                         &shared, error);
   if (status == CLT_OK) {
     status = shared.rank > 0 ? write_shared(job, own, &shared, error) : write_each(job, own, of, channels, rank, error);
   }

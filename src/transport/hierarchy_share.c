@@ -10,9 +10,6 @@
 #include "base/memory.h"
 #include "counterlight/transport.h"
 
-/* Of a channel's tolerance: singular values below take no part, and what is left for those that do. */
-static const double BELOW = 0.125, LEFT = 0.875;
-
 /* One side of all channels side by side, each column as long as its singular value over the tolerance: its singular
  * value decomposition by the eigenvectors of the Gram matrix. */
 typedef struct stack {
@@ -34,7 +31,7 @@ typedef struct share {
 static void count_columns(share *s) {
   for (size_t c = 0; c < s->channels; c++) {
     size_t count = 0;
-    while (count < s->of[c].count && s->of[c].value[count] > BELOW * s->tolerance[c]) {
+    while (count < s->of[c].count && s->of[c].value[count] > s->tolerance[c]) {
       count++;
     }
     s->first[c + 1] = s->first[c] + count;
@@ -133,7 +130,7 @@ static bool is_enough(const share *s, size_t rank) {
       norm = cblas_dnrm2((blasint)s->all, y, 1);
       apply_rest(s, c, rank, true, y, x);
     }
-    if (norm > LEFT) {
+    if (norm > 1) {
       return false;
     }
   }

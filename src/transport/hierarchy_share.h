@@ -25,8 +25,9 @@ typedef struct clt_shared {
   float *core;          /* channels x rank x rank, row by row */
 } clt_shared;
 
-/* The least rank, in steps of `step` and at most `most`, at which every channel is off by no more than its tolerance
- * (in the spectral norm: times the drive's norm). The caller finishes out, also after a failure (CLT_FAILED). */
+/* The least rank, in steps of `step` and at most `most`, at which what a channel has above its tolerance is off by no
+ * more than that (in the spectral norm: times the drive's norm); singular values up to the tolerance take no part. The
+ * caller finishes out, also after a failure (CLT_FAILED). */
 clt_status clt_singular_share(const clt_singular *of, size_t channels, const double *tolerance, size_t step,
                               size_t most, clt_shared *out, clt_error *error);
 void clt_shared_finish(clt_shared *shared);

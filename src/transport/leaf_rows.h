@@ -9,7 +9,7 @@
 #include "counterlight/status.h"
 #include "transport/kernels.h"
 
-enum { CLT_LEAF_TERMS = 4 };
+enum { CLT_LEAF_TERMS = 4, CLT_RANK_STEP = 8 /* columns that kernels take at once */ };
 
 typedef struct clt_leaf_rows {
   int bits;    /* 32, 16 or 8 */
