@@ -349,7 +349,7 @@ static void test_shared(void **unused) {
     const double swing = step < 6 ? 0.3 : 1.5;
     for (int at = 0; at < VALUES; at++) {
       const int x = at % SIDE_X, y = at % CELLS / SIDE_X;
-      target[at] = (float)(0.6 + 0.5 * swing * sin(0.4 * x + 0.1 * step) * cos(0.3 * y) + 0.05 * (at / CELLS));
+      target[at] = (float)(0.6 + 0.4 * swing * sin(0.4 * x + 0.1 * step) * cos(0.3 * y) + 0.05 * (at / CELLS));
       target[at] = fmaxf(target[at], 0);
       wanted[at] = (double)target[at];
     }
