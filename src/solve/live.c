@@ -7,9 +7,6 @@
 
 #include "base/clock.h"
 #include "base/memory.h"
-#include "base/turns.h"
-
-enum { WORTH_SHARING = 16384 /* values */ };
 
 static clt_status check_options(const clt_live_options *options, const clt_transport_info *info, clt_error *error) {
   if (options != NULL && !(options->target_error >= 0 && options->target_error < 1)) {
@@ -105,47 +102,11 @@ void clt_live_destroy(clt_live *live) {
   }
 }
 
-/* The sum of a channel's squares over lit cells; NaN or infinite where any value is not finite. */
-static double sum_squares(const float *values, const unsigned char *lit, size_t count) {
-  enum { LANES = 8 };
-  double lane[LANES] = {0}, sum = 0;
-  size_t i = 0;
-  for (; i + LANES <= count; i += LANES) {
-    for (size_t l = 0; l < LANES; l++) {
-      const double value = (double)values[i + l];
-      lane[l] += value * value * (double)lit[i + l];
-    }
-  }
-  for (; i < count; i++) {
-    sum += (double)values[i] * (double)values[i] * (double)lit[i];
-  }
-  for (size_t l = 0; l < LANES; l++) {
-    sum += lane[l];
-  }
-  return sum;
-}
-
-/* ||target|| over lit cells of every channel, or ||white|| of a target that is black. Its sums do not depend on the
- * number of threads. */
-static clt_status measure_target(clt_live *live, const float *target, clt_error *error) {
-  enum { SLICES = 16 };
-  const size_t cells = live->info.cols, slices = SLICES * (size_t)live->info.channels;
-  double part[SLICES * CLT_CHANNELS_MAX], sum = 0;
-  clt_turns turns = clt_turns_of(slices);
-#pragma omp parallel if ((size_t)live->info.channels * cells >= WORTH_SHARING)
-  for (size_t turn = 0; clt_turns_next(&turns, &turn);) {
-    const size_t channel = turn / SLICES, first = cells * (turn % SLICES) / SLICES;
-    const size_t end = cells * (turn % SLICES + 1) / SLICES;
-    part[turn] = sum_squares(target + channel * cells + first,
-                             clt_certificate_lit(live->certificate, (int)channel) + first, end - first);
-  }
-  for (size_t k = 0; k < slices; k++) {
-    sum += part[k];
-  }
-  if (!isfinite(sum)) {
+clt_status clt_live_measure(clt_live *live, double squares, clt_error *error) {
+  if (!isfinite(squares)) {
     return clt_fail(error, CLT_BAD_INPUT, "a target of moving pictures has values that are not finite");
   }
-  live->size = sum > 0 ? sqrt(sum) : live->white_norm > 0 ? live->white_norm : 1;
+  live->size = squares > 0 ? sqrt(squares) : live->white_norm > 0 ? live->white_norm : 1;
   return CLT_OK;
 }
 
@@ -161,10 +122,7 @@ clt_status clt_live_solve(clt_live *live, const float *target, float *drive, clt
                           clt_error *error) {
   live->start_ns = clt_clock_ns();
   *result = (clt_live_result){0};
-  clt_status status = measure_target(live, target, error);
-  if (status == CLT_OK) {
-    status = live->form->solve(live, target, drive, result, error);
-  }
+  const clt_status status = live->form->solve(live, target, drive, result, error);
   if (status == CLT_OK) {
     result->error = hypot(result->residual, live->seen * operator_error(live));
     result->total_ms = 1e3 * clt_clock_since(live->start_ns);

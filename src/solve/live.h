@@ -11,7 +11,7 @@ typedef struct clt_live_form {
   clt_status (*create)(clt_live *live, clt_error *error);
   void (*destroy)(clt_live *live); /* accepts half-built ones */
   void (*reset)(clt_live *live);
-  /* Fills drive and all of result but total_ms and error. */
+  /* Fills drive and all of result but total_ms and error. Hands the target's size to clt_live_measure. */
   clt_status (*solve)(clt_live *live, const float *target, float *drive, clt_live_result *result, clt_error *error);
 } clt_live_form;
 
@@ -30,6 +30,10 @@ struct clt_live {
   double size;       /* ||target|| of the frame over the same, or that of a target that is black */
   double seen;       /* ||T drive|| over the same, relative to ||target||: the form's part of the estimate */
 };
+
+/* Takes ||target||^2 over lit cells of every channel; CLT_BAD_INPUT where it is not finite, which it shall not be where
+ * a value of the target is not, dark cells included. */
+clt_status clt_live_measure(clt_live *live, double squares, clt_error *error);
 
 /* The passes over a hierarchy that a frame is made of: the target taken, the drive moved, far light collected and
  * spread, the light of the drive and what is left. */

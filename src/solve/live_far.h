@@ -33,25 +33,28 @@
 enum {
   CLT_LIVE_AROUND = 8,
   CLT_LIVE_LANES = 8,
+  CLT_LIVE_ROWS = 8, /* that a strip goes down before the one beside it is taken */
+  CLT_LIVE_CODES = CLT_LIVE_ROWS * CLT_LIVE_AROUND,
   CLT_LIVE_MOMENTS = 9
 }; /* of a weight over a leaf: the sums with u^a v^b, a and b 0..2, at [3 b + a] */
 
-/* What passes read of a strip of a row: lanes of each, one after the other; 0 behind a leaf's edge and at dark cells.
- */
-typedef enum clt_live_plane {
-  CLT_LIVE_OWN,
-  CLT_LIVE_INVERSE, /* 1 / D */
-  CLT_LIVE_SCALE,
-  CLT_LIVE_GATHER,
-  CLT_LIVE_FLOOD,
-  CLT_LIVE_PLANES
-} clt_live_plane;
+/* What every pass reads of a strip of a row, a cache line; 0 behind a leaf's edge and at dark cells. Numbers of 16 bits
+ * stand in twos in a word, where each is had by one operation and a conversion, as a multiple of a unit that an item
+ * has for each kind: right to within 1.6e-5 of the largest of the item. */
+typedef struct clt_live_strip {
+  float own[CLT_LIVE_LANES];
+  int32_t pair[CLT_LIVE_LANES]; /* gather, black */
+} clt_live_strip;
+
+typedef enum clt_live_unit { CLT_LIVE_GATHER, CLT_LIVE_BLACK, CLT_LIVE_SPILL, CLT_LIVE_UNITS } clt_live_unit;
 
 /* One channel of one leaf. */
 typedef struct clt_live_item {
   int channel;
   size_t leaf;
-  size_t first, block; /* its first strip of a row, and its first block of near light */
+  size_t first, block, code; /* its first strip of a row, block of spill and code */
+  bool damped;               /* D is not `own` at every lit cell */
+  float unit[CLT_LIVE_UNITS];
   float far[CLT_LEAF_TERMS], pull[CLT_LEAF_TERMS], turn[CLT_LEAF_TERMS]; /* A z, B q, A dz over the leaf */
   float give[CLT_LEAF_TERMS], take[CLT_LEAF_TERMS];  /* the leaf's part of the right sides, before B' and A' */
   float whole[CLT_LEAF_TERMS];                       /* P' diag(k) r */
@@ -60,6 +63,7 @@ typedef struct clt_live_item {
   float weight[3][CLT_LIVE_MOMENTS];                 /* of v k / D and (v / D)^2 where free, k^2 where held */
   float counted[3][CLT_LIVE_MOMENTS];                /* of these: what the products of the factor know */
   double residual, gap, wanted, seen, light;         /* ||r||^2, ||D s||^2, ||b||^2, ||b - r||^2, the sum of x */
+  double size; /* ||target||^2 over lit cells, not finite where any value is not */
 } clt_live_item;
 
 typedef struct clt_far clt_far;
@@ -67,10 +71,10 @@ typedef struct clt_far clt_far;
 typedef struct clt_live_kernels {
   const char *needs; /* NULL: nothing */
   bool (*runs_here)(void);
-  /* Takes the target over an item (what is wanted of it), with the light that the drive is known to give: r and what
-   * the Newton step needs of it. */
+  /* Takes a new target over an item, with the light that the drive is known to give: how large it is, r, and what the
+   * Newton step needs of r. */
   void (*aim)(const clt_far *far, clt_live_item *item);
-  /* The same, of what is wanted already, with the light of the drive as it is now. */
+  /* The same of r with the light of the drive as it is now. */
   void (*look)(const clt_far *far, clt_live_item *item);
   /* next = P01(x + D^-1 (r - k P turn + v P pull / D)). */
   void (*move)(const clt_far *far, clt_live_item *item, float *next);
@@ -83,22 +87,30 @@ struct clt_far {
   const clt_live_kernels *kernels;
   int width, channels;
   size_t cells, items, rank;
-  bool shared;                      /* passes are long enough for threads */
-  clt_live_item *item;              /* channel by channel, leaf by leaf */
-  size_t strips;                    /* of rows, in all items */
-  size_t blocks;                    /* of near light, in all items */
-  float *constant;                  /* strips x CLT_LIVE_PLANES x lanes */
-  float *wanted, *shown, *drive[3]; /* strips x lanes: b, and the light T x of the last look; channels x cells */
-  float *vectors;                   /* that these lie in */
-  /* Near light by the directions of the eight cells around a cell, in reading order: which of them each strip of a row
-   * has, and their lanes one after the other; NULL where some near entries join cells that are no neighbours. Drives
+  bool shared;             /* passes are long enough for threads */
+  clt_live_item *item;     /* channel by channel, leaf by leaf */
+  size_t strips;           /* of rows, in all items */
+  size_t blocks;           /* of spill, in all items */
+  clt_live_strip *strip;   /* strips */
+  float *scale;            /* strips x lanes; NULL where it is 1 everywhere */
+  float *diagonal;         /* D, strips x lanes, filled where items are damped; NULL where none is */
+  float *shown, *drive[3]; /* strips x lanes: the light T x of the last look; channels x cells */
+  float *vectors;          /* that these lie in */
+  float place[(CLT_LEAF_SIDE_MAX + 1) *
+              CLT_LEAF_SIDE_MAX]; /* clt_leaf_place, of cell k at [CLT_LEAF_SIDE_MAX side + k] */
+  /* Light that `look` alone needs, of each strip's rows that it goes down: flood, row by row, and near light that
+   * spills over from the eight cells around a cell, both in pairs of lanes. `code` has how many pairs of near light
+   * there are, and of each of both the row and the direction in reading order, CLT_LIVE_AROUND row + direction. Drives
    * have room for a row, a cell and a strip before and behind them. */
-  unsigned char *around;
-  float *spill;
-  const float *target, *black[CLT_CHANNELS_MAX]; /* of the frame */
-  bool open;                    /* no cell is taken to be held: a step from nothing goes for the unbounded drive */
-  int now, best;                /* of drive */
-  float mean[CLT_CHANNELS_MAX]; /* of the drive */
+  int32_t *spill;
+  unsigned char *code;
+  size_t codes;                     /* in all items */
+  ptrdiff_t offset[CLT_LIVE_CODES]; /* of each code, from the strip's first cell to the one that spills */
+  bool scattered;                   /* some near entries join cells that are no neighbours: then spill is flood only */
+  const float *target;              /* of the frame */
+  bool open;                        /* no cell is taken to be held: a step from nothing goes for the unbounded drive */
+  int now, best;                    /* of drive */
+  float mean[CLT_CHANNELS_MAX];     /* of the drive */
   size_t lit[CLT_CHANNELS_MAX];
   size_t coupled[CLT_CHANNELS_MAX]; /* the first so many of the rank, which the factor couples */
   bool bound[CLT_CHANNELS_MAX];     /* some cells are held */
@@ -120,8 +132,27 @@ struct clt_far {
 extern const clt_live_kernels *const clt_live_variants[];
 const clt_live_kernels *clt_live_choose(void);
 
-/* Lays out what passes read: `inverse` is 1 / D, channels x cells, 0 at dark ones. */
-clt_status clt_live_pack(clt_far *far, const float *inverse, clt_error *error);
+/* Lays out what passes read: `diagonal` is D, channels x cells, 0 at dark ones; black[channel] that of the transport.
+ */
+clt_status clt_live_pack(clt_far *far, const float *diagonal, const float *const *black, clt_error *error);
+void clt_live_unpack(clt_far *far); /* accepts what was not, or only in part */
+
+/* The strip of a row of a leaf that passes take as their number'th: down CLT_LIVE_ROWS rows, then beside it, so that
+ * what lies as pictures do is in the first cache until its whole lines are used. */
+typedef struct clt_live_spot {
+  int32_t row, across;
+} clt_live_spot;
+static inline int32_t clt_live_across(const clt_leaf *leaf) {
+  return (leaf->width + CLT_LIVE_LANES - 1) / CLT_LIVE_LANES;
+}
+static inline int32_t clt_live_rows_below(const clt_leaf *leaf, int32_t top) {
+  return leaf->height - top < CLT_LIVE_ROWS ? leaf->height - top : CLT_LIVE_ROWS;
+}
+static inline clt_live_spot clt_live_spot_of(const clt_leaf *leaf, int32_t number) {
+  const int32_t each = CLT_LIVE_ROWS * clt_live_across(leaf), top = number / each * CLT_LIVE_ROWS;
+  const int32_t rows = clt_live_rows_below(leaf, top);
+  return (clt_live_spot){top + number % each % rows, number % each / rows * CLT_LIVE_LANES};
+}
 
 /* Room for the small systems of every channel, and how much of the rank the factor couples. */
 clt_status clt_newton_create(clt_far *far, clt_error *error);

@@ -64,10 +64,11 @@ static void tell(clt_live *live, const clt_solve_result *solve, double wanted, d
   live->seen = wanted / size + result->residual;
 }
 
-/* Fills what is wanted and returns its norm over lit cells. */
-static double want(clt_live *live, const float *target) {
+/* Fills what is wanted and returns its norm over lit cells; *size = ||target||^2 over these. */
+static double want(clt_live *live, const float *target, double *size) {
   general *own = live->own;
   double sum = 0;
+  *size = 0;
   for (int c = 0; c < live->info.channels; c++) {
     const float *black = clt_transport_black(live->transport, c);
     const unsigned char *lit = clt_certificate_lit(live->certificate, c);
@@ -75,6 +76,7 @@ static double want(clt_live *live, const float *target) {
       const size_t at = (size_t)c * live->info.cols + i;
       own->wanted[at] = (double)target[at] - (double)black[i];
       sum += lit[i] ? own->wanted[at] * own->wanted[at] : 0;
+      *size += (double)target[at] * (lit[i] ? (double)target[at] : 0); /* finite values only */
     }
   }
   return sqrt(sum);
@@ -84,10 +86,15 @@ static clt_status solve_frame(clt_live *live, const float *target, float *drive,
                               clt_error *error) {
   general *own = live->own;
   clt_solve_result solve = {0};
-  const double wanted = want(live, target);
+  double size = 0;
+  const double wanted = want(live, target, &size);
+  clt_status status = clt_live_measure(live, size, error);
+  if (status != CLT_OK) {
+    return status;
+  }
   result->ms[CLT_LIVE_PREPARE] = 1e3 * clt_clock_since(live->start_ns);
   own->solver->options.deadline_s = 1e-3 * live->options.budget_ms;
-  clt_status status = clt_solver_run(own->solver, own->wanted, own->start, own->drive, &solve, error);
+  status = clt_solver_run(own->solver, own->wanted, own->start, own->drive, &solve, error);
   if (status == CLT_OK) {
     memcpy(own->start, own->drive, values_of(live) * sizeof *own->drive);
     tell(live, &solve, wanted, live->size, result);

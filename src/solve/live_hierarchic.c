@@ -15,7 +15,7 @@ static const double SLOW = 0.3;   /* of the gap before: what a step leaves with 
 
 /* A frame under way. */
 typedef struct frame {
-  double wanted;                      /* ||target - black||^2 over lit cells */
+  double size, wanted;                /* ||target||^2 and ||target - black||^2 over lit cells */
   double objective, least, gap, seen; /* squares: of the residual, the least so far, the gap, and what is seen */
   double held;                        /* cells */
   double last_s;                      /* that the last step took */
@@ -28,33 +28,37 @@ static size_t values_of(const clt_live *live) {
   return (size_t)live->info.channels * live->info.cols;
 }
 
-/* inverse = 1 / D at lit cells, else 0; where the near light of a cell is less than half of what it shows of itself,
- * half of that. diagonal is room for a channel. */
-static void invert_cells(const clt_live *live, clt_far *far, double *diagonal, float *inverse) {
+/* diagonal = D at lit cells, else 0: what a cell shows of itself, or where its near light is less than half of that,
+ * half of it. entry is room for a channel. */
+static void find_diagonal(const clt_live *live, clt_far *far, double *entry, float *diagonal) {
   for (int c = 0; c < live->info.channels; c++) {
     const unsigned char *lit = clt_certificate_lit(live->certificate, c);
-    clt_transport_diagonal(live->transport, c, diagonal);
+    clt_transport_diagonal(live->transport, c, entry);
     for (size_t i = 0; i < far->cells; i++) {
       const size_t at = (size_t)c * far->cells + i;
-      const double light = fmax((double)far->hierarchy->own[at], diagonal[i] / 2);
-      inverse[at] = lit[i] && light > 0 ? (float)(1 / light) : 0;
-      far->lit[c] += inverse[at] > 0;
+      const double light = fmax((double)far->hierarchy->own[at], entry[i] / 2);
+      diagonal[at] = lit[i] && light > 0 ? (float)light : 0;
+      far->lit[c] += diagonal[at] > 0;
     }
   }
 }
 
 static clt_status lay_out(const clt_live *live, clt_far *far, clt_error *error) {
-  double *diagonal = clt_alloc(far->cells, sizeof *diagonal);
-  float *inverse = clt_alloc(values_of(live), sizeof *inverse);
+  double *entry = clt_alloc(far->cells, sizeof *entry);
+  float *diagonal = clt_alloc(values_of(live), sizeof *diagonal);
+  const float *black[CLT_CHANNELS_MAX] = {NULL};
   clt_status status = CLT_OK;
-  if (diagonal == NULL || inverse == NULL) {
+  if (entry == NULL || diagonal == NULL) {
     status = clt_fail(error, CLT_FAILED, "no memory for the light of %zu cells", far->cells);
   } else {
-    invert_cells(live, far, diagonal, inverse);
-    status = clt_live_pack(far, inverse, error);
+    for (int c = 0; c < far->channels; c++) {
+      black[c] = clt_transport_black(live->transport, c);
+    }
+    find_diagonal(live, far, entry, diagonal);
+    status = clt_live_pack(far, diagonal, black, error);
   }
+  free(entry);
   free(diagonal);
-  free(inverse);
   return status;
 }
 
@@ -80,9 +84,6 @@ static clt_status create(clt_live *live, clt_error *error) {
     far->item[k].channel = (int)(k / hierarchy->leaves);
     far->item[k].leaf = k % hierarchy->leaves;
   }
-  for (int c = 0; c < far->channels; c++) {
-    far->black[c] = clt_transport_black(live->transport, c);
-  }
   clt_status status = lay_out(live, far, error);
   return status == CLT_OK ? clt_newton_create(far, error) : status;
 }
@@ -91,10 +92,7 @@ static void destroy(clt_live *live) {
   clt_far *far = live->own;
   if (far != NULL) {
     clt_newton_destroy(far);
-    free(far->constant);
-    free(far->vectors);
-    free(far->around);
-    free(far->spill);
+    clt_live_unpack(far);
     free(far->item);
     free(far);
   }
@@ -118,13 +116,14 @@ static void reset(clt_live *live) {
 /* What a pass over the cells has found of the drive as it stands. */
 static void add_up(clt_far *far, frame *at) {
   const double before = at->gap;
-  at->objective = at->gap = at->seen = at->wanted = 0;
+  at->objective = at->gap = at->seen = at->wanted = at->size = 0;
   at->held = 0;
   for (size_t k = 0; k < far->items; k++) {
     at->objective += far->item[k].residual;
     at->gap += far->item[k].gap;
     at->seen += far->item[k].seen;
     at->wanted += far->item[k].wanted;
+    at->size += far->item[k].size;
     at->held += (double)far->item[k].held[0];
   }
   at->renew = before > 0 && at->gap > SLOW * SLOW * before;
@@ -339,11 +338,14 @@ static void hand_over(const clt_live *live, const clt_far *far, float *drive) {
 
 static clt_status solve_frame(clt_live *live, const float *target, float *drive, clt_live_result *result,
                               clt_error *error) {
-  (void)error;
   clt_far *far = live->own;
   frame at = {.least = INFINITY};
   far->target = target;
   aim(far, &at);
+  const clt_status status = clt_live_measure(live, at.size, error);
+  if (status != CLT_OK) {
+    return status;
+  }
   result->ms[CLT_LIVE_PREPARE] = 1e3 * clt_clock_since(live->start_ns);
   run(live, far, &at, result);
   if (!result->converged && far->now != far->best) {

@@ -1,12 +1,14 @@
 /* What passes over a hierarchy read, laid out as they read it: leaf by leaf, strip by strip, row by row. Planes of a
  * power of two cells, one beside the other, would share a few cache lines, and rows of a picture break off where a leaf
  * ends. */
+#include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/memory.h"
 #include "solve/live_far.h"
 
-enum { LANES = CLT_LIVE_LANES };
+enum { LANES = CLT_LIVE_LANES, MOST = INT16_MAX, HALF = 1 << 16 };
 
 /* A strip of a row of an item: where its cells begin in a plane, and how many there are. */
 typedef struct strip {
@@ -15,13 +17,17 @@ typedef struct strip {
 } strip;
 
 static int32_t strips_of(const clt_leaf *leaf) {
-  return (leaf->width + LANES - 1) / LANES;
+  return clt_live_across(leaf) * leaf->height;
+}
+
+static const clt_leaf *leaf_of(const clt_far *far, const clt_live_item *item) {
+  return &far->hierarchy->leaf[item->leaf];
 }
 
 static strip strip_of(const clt_far *far, const clt_leaf *leaf, int32_t number) {
-  const int32_t across = number / leaf->height * LANES, row = number % leaf->height;
-  const int32_t left = leaf->width - across;
-  return (strip){(size_t)(leaf->y + row) * (size_t)far->width + (size_t)(leaf->x + across),
+  const clt_live_spot spot = clt_live_spot_of(leaf, number);
+  const int32_t left = leaf->width - spot.across;
+  return (strip){(size_t)(leaf->y + spot.row) * (size_t)far->width + (size_t)(leaf->x + spot.across),
                  left < LANES ? left : LANES};
 }
 
@@ -45,135 +51,263 @@ static bool joins_neighbours(const clt_far *far) {
   return true;
 }
 
-static void pack_constants(clt_far *far, const clt_live_item *item, const float *inverse) {
-  const clt_hierarchy_storage *own = far->hierarchy;
-  const clt_leaf *leaf = &own->leaf[item->leaf];
-  const size_t base = (size_t)item->channel * far->cells;
-  for (int32_t number = 0; number < strips_of(leaf) * leaf->height; number++) {
-    const strip at = strip_of(far, leaf, number);
-    float *to = far->constant + (item->first + (size_t)number) * CLT_LIVE_PLANES * LANES;
-    for (size_t l = 0; l < (size_t)at.count; l++) {
-      const size_t cell = base + at.cell + l;
-      if (inverse[cell] > 0) {
-        to[CLT_LIVE_OWN * LANES + l] = own->own[cell];
-        to[CLT_LIVE_INVERSE * LANES + l] = inverse[cell];
-        to[CLT_LIVE_SCALE * LANES + l] = own->scale[cell];
-        to[CLT_LIVE_GATHER * LANES + l] = own->gather[cell];
-        to[CLT_LIVE_FLOOD * LANES + l] = own->flood[cell];
-      }
-    }
-  }
+/* Two whole numbers of 16 bits in a word: passes find each of them as that many times HALF. */
+static int32_t pair_of(int32_t upper, int32_t lower) {
+  return upper * HALF + (lower & (HALF - 1));
 }
 
-/* Which directions the lit cells of a strip have near light from. */
-static unsigned directions_of(const clt_far *far, strip at, const float *inverse) {
-  const clt_hierarchy_storage *own = far->hierarchy;
-  unsigned all = 0;
-  for (size_t i = at.cell; i < at.cell + (size_t)at.count; i++) {
-    for (int64_t e = own->start[i]; inverse[i] > 0 && e < own->start[i + 1]; e++) {
-      all |= 1u << direction_of(far, i, (size_t)own->cell[e]);
-    }
-  }
-  return all;
+static int32_t whole(float value, float unit) {
+  return unit > 0 ? (int32_t)lrintf(value / (unit * HALF)) : 0;
 }
 
-static size_t count_ones(unsigned bits) {
-  size_t count = 0;
-  for (; bits != 0; bits &= bits - 1) {
-    count++;
-  }
-  return count;
-}
-
-static void pack_near(clt_far *far, const clt_live_item *item, const float *inverse) {
-  const clt_hierarchy_storage *own = far->hierarchy;
-  const clt_leaf *leaf = &own->leaf[item->leaf];
-  const float *value = own->value + (size_t)item->channel * (size_t)own->start[far->cells];
-  const float *lit = inverse + (size_t)item->channel * far->cells;
-  float *to = far->spill + item->block * LANES;
-  for (int32_t number = 0; number < strips_of(leaf) * leaf->height; number++) {
-    const strip at = strip_of(far, leaf, number);
-    const unsigned around = far->around[item->first + (size_t)number];
-    for (size_t l = 0; l < (size_t)at.count; l++) {
-      const size_t i = at.cell + l;
-      for (int64_t e = own->start[i]; lit[i] > 0 && e < own->start[i + 1]; e++) {
-        const unsigned direction = 1u << direction_of(far, i, (size_t)own->cell[e]);
-        to[count_ones(around & (direction - 1)) * LANES + l] += value[e];
-      }
-    }
-    to += count_ones(around) * LANES;
-  }
-}
-
-/* Finds where every item's strips and blocks of near light begin, and how many blocks there are. */
-static void find_places(clt_far *far, const float *inverse, bool near) {
-  size_t strips = 0, blocks = 0;
-  for (size_t k = 0; k < far->items; k++) {
-    clt_live_item *item = &far->item[k];
-    const clt_leaf *leaf = &far->hierarchy->leaf[item->leaf];
-    item->first = strips;
-    item->block = blocks;
-    for (int32_t number = 0; near && number < strips_of(leaf) * leaf->height; number++) {
-      const unsigned around =
-          directions_of(far, strip_of(far, leaf, number), inverse + (size_t)item->channel * far->cells);
-      far->around[strips + (size_t)number] = (unsigned char)around;
-      blocks += count_ones(around);
-    }
-    strips += (size_t)(strips_of(leaf) * leaf->height);
-  }
-  far->blocks = blocks;
-}
-
-static size_t count_strips(const clt_far *far) {
-  size_t strips = 0;
-  for (size_t k = 0; k < far->items; k++) {
-    const clt_leaf *leaf = &far->hierarchy->leaf[far->item[k].leaf];
-    strips += (size_t)(strips_of(leaf) * leaf->height);
-  }
-  return strips;
+static float unit_for(float most) {
+  return most / MOST / HALF;
 }
 
 static clt_status fail(const clt_far *far, clt_error *error) {
   return clt_fail(error, CLT_FAILED, "no memory for moving pictures of %zu cells", far->cells);
 }
 
-static clt_status reserve(clt_far *far, clt_error *error) {
+/* The unit of a plane over an item's lit cells. */
+static float unit_of(const clt_far *far, const clt_live_item *item, const float *diagonal, const float *plane) {
+  const clt_leaf *leaf = leaf_of(far, item);
+  float most = 0;
+  for (int32_t k = 0; k < leaf->width * leaf->height; k++) {
+    const size_t cell = (size_t)(leaf->y + k / leaf->width) * (size_t)far->width + (size_t)(leaf->x + k % leaf->width);
+    most = diagonal[cell] > 0 ? fmaxf(most, fabsf(plane[cell])) : most;
+  }
+  return unit_for(most);
+}
+
+static void pack_strips(clt_far *far, clt_live_item *item, const float *diagonal, const float *black) {
+  const clt_hierarchy_storage *own = far->hierarchy;
+  const size_t base = (size_t)item->channel * far->cells;
+  const clt_leaf *leaf = leaf_of(far, item);
+  const float *gather = own->gather + base, *scale = own->scale + base;
+  item->unit[CLT_LIVE_GATHER] = unit_of(far, item, diagonal, gather);
+  item->unit[CLT_LIVE_BLACK] = unit_of(far, item, diagonal, black);
+  for (int32_t number = 0; number < strips_of(leaf); number++) {
+    const strip at = strip_of(far, leaf, number);
+    const size_t place = item->first + (size_t)number;
+    clt_live_strip *to = &far->strip[place];
+    for (size_t l = 0; l < (size_t)at.count; l++) {
+      const size_t cell = at.cell + l;
+      if (diagonal[cell] > 0) {
+        to->own[l] = own->own[base + cell];
+        to->pair[l] =
+            pair_of(whole(gather[cell], item->unit[CLT_LIVE_GATHER]), whole(black[cell], item->unit[CLT_LIVE_BLACK]));
+        if (far->scale != NULL) {
+          far->scale[place * LANES + l] = scale[cell];
+        }
+      }
+    }
+  }
+}
+
+/* What spills over to some rows of a strip. */
+typedef struct spilled {
+  int32_t rows, count;                /* count: of codes that occur */
+  unsigned char code[CLT_LIVE_CODES]; /* direction by direction, so that a row is not added to twice at once */
+  float flood[CLT_LIVE_ROWS][LANES], near[CLT_LIVE_CODES][LANES]; /* near light by code */
+} spilled;
+
+/* The rows of a strip that begin with the item's number'th strip of a row. */
+static void find_spilled(const clt_far *far, const clt_live_item *item, int32_t number, const float *diagonal,
+                         spilled *found) {
+  const clt_hierarchy_storage *own = far->hierarchy;
+  const clt_leaf *leaf = leaf_of(far, item);
+  const float *flood = own->flood + (size_t)item->channel * far->cells;
+  const float *value = own->value + (size_t)item->channel * (size_t)own->start[far->cells];
+  bool occurs[CLT_LIVE_CODES] = {false};
+  *found = (spilled){.rows = clt_live_rows_below(leaf, clt_live_spot_of(leaf, number).row)};
+  for (int32_t k = 0; k < found->rows * LANES; k++) {
+    const strip at = strip_of(far, leaf, number + k / LANES);
+    const size_t i = at.cell + (size_t)(k % LANES);
+    if (k % LANES < at.count && diagonal[i] > 0) {
+      found->flood[k / LANES][k % LANES] = flood[i];
+      for (int64_t e = own->start[i]; !far->scattered && e < own->start[i + 1]; e++) {
+        const int32_t code = k / LANES * CLT_LIVE_AROUND + direction_of(far, i, (size_t)own->cell[e]);
+        found->near[code][k % LANES] += value[e];
+        occurs[code] = true;
+      }
+    }
+  }
+  for (int32_t k = 0; k < CLT_LIVE_CODES; k++) {
+    const int32_t code = k % CLT_LIVE_ROWS * CLT_LIVE_AROUND + k / CLT_LIVE_ROWS;
+    if (occurs[code]) {
+      found->code[found->count++] = (unsigned char)code;
+    }
+  }
+}
+
+static int32_t pairs_of(int32_t count) {
+  return (count + 1) / 2;
+}
+
+/* Finds where an item's spill begins and its unit; from there on the next one's. */
+static void measure_spill(clt_far *far, clt_live_item *item, const float *diagonal) {
+  const clt_leaf *leaf = leaf_of(far, item);
+  float most = 0;
+  spilled found;
+  item->block = far->blocks;
+  item->code = far->codes;
+  for (int32_t number = 0; number < strips_of(leaf); number += found.rows) {
+    find_spilled(far, item, number, diagonal, &found);
+    for (int32_t k = 0; k < LANES * (found.rows + found.count); k++) {
+      const int32_t row = k / LANES, lane = k % LANES;
+      most = fmaxf(most,
+                   fabsf(row < found.rows ? found.flood[row][lane] : found.near[found.code[row - found.rows]][lane]));
+    }
+    far->blocks += (size_t)(pairs_of(found.rows) + pairs_of(found.count));
+    far->codes += (size_t)(1 + 2 * pairs_of(found.count));
+  }
+  item->unit[CLT_LIVE_SPILL] = unit_for(most);
+}
+
+/* Lanes of two; lower may be NULL. */
+static int32_t *put_pair(int32_t *to, float unit, const float *upper, const float *lower) {
+  for (int32_t l = 0; l < LANES; l++) {
+    *to++ = pair_of(whole(upper[l], unit), lower != NULL ? whole(lower[l], unit) : 0);
+  }
+  return to;
+}
+
+static void pack_spill(clt_far *far, const clt_live_item *item, const float *diagonal) {
+  const clt_leaf *leaf = leaf_of(far, item);
+  const float unit = item->unit[CLT_LIVE_SPILL];
+  int32_t *to = far->spill + item->block * LANES;
+  unsigned char *code = far->code + item->code;
+  spilled found;
+  for (int32_t number = 0; number < strips_of(leaf); number += found.rows) {
+    find_spilled(far, item, number, diagonal, &found);
+    for (int32_t row = 0; row < found.rows; row += 2) {
+      to = put_pair(to, unit, found.flood[row], row + 1 < found.rows ? found.flood[row + 1] : NULL);
+    }
+    *code++ = (unsigned char)pairs_of(found.count);
+    for (int32_t k = 0; k < found.count; k += 2, code += 2) {
+      const bool paired = k + 1 < found.count;
+      code[0] = found.code[k];
+      code[1] = paired ? found.code[k + 1] : 0;
+      to = put_pair(to, unit, found.near[code[0]], paired ? found.near[code[1]] : NULL);
+    }
+  }
+}
+
+static void find_places(clt_far *far, const float *diagonal) {
+  for (size_t k = 0; k < far->items; k++) {
+    clt_live_item *item = &far->item[k];
+    item->first = far->strips;
+    far->strips += (size_t)strips_of(leaf_of(far, item));
+    measure_spill(far, item, diagonal + (size_t)item->channel * far->cells);
+  }
+}
+
+/* Whether D is something else than `own` at any lit cell of an item. */
+static bool is_damped(const clt_far *far, const clt_live_item *item, const float *diagonal) {
+  const clt_leaf *leaf = leaf_of(far, item);
+  const float *own = far->hierarchy->own + (size_t)item->channel * far->cells;
+  for (int32_t number = 0; number < strips_of(leaf); number++) {
+    const strip at = strip_of(far, leaf, number);
+    for (size_t i = at.cell; i < at.cell + (size_t)at.count; i++) {
+      if (diagonal[i] > 0 && diagonal[i] != own[i]) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+static void pack_diagonal(clt_far *far, const clt_live_item *item, const float *diagonal) {
+  const clt_leaf *leaf = leaf_of(far, item);
+  for (int32_t number = 0; number < strips_of(leaf); number++) {
+    const strip at = strip_of(far, leaf, number);
+    memcpy(far->diagonal + (item->first + (size_t)number) * LANES, diagonal + at.cell,
+           (size_t)at.count * sizeof *diagonal);
+  }
+}
+
+static bool is_scaled(const clt_far *far) {
+  for (size_t at = 0; at < (size_t)far->channels * far->cells; at++) {
+    if (far->hierarchy->scale[at] != 1) {
+      return true;
+    }
+  }
+  return false;
+}
+
+static bool any_is_damped(clt_far *far, const float *diagonal) {
+  bool any = false;
+  for (size_t k = 0; k < far->items; k++) {
+    clt_live_item *item = &far->item[k];
+    item->damped = is_damped(far, item, diagonal + (size_t)item->channel * far->cells);
+    any = any || item->damped;
+  }
+  return any;
+}
+
+/* Drives do not begin at the same place of a page, where rows of all of them would share a few cache lines. */
+static void place_drives(clt_far *far, size_t margin, size_t drive) {
+  for (size_t k = 0; k < 3; k++) {
+    far->drive[k] = far->vectors + k * drive + margin;
+  }
+  far->shown = far->vectors + 3 * drive;
+}
+
+static clt_status reserve(clt_far *far, const float *diagonal, clt_error *error) {
+  enum { PAGE = 1024, APART = 304 /* values */ };
   const size_t values = (size_t)far->channels * far->cells, lanes = far->strips * LANES;
-  const size_t margin = (size_t)far->width + 1 + LANES, drive = values + 2 * margin;
-  far->constant = clt_alloc(lanes, CLT_LIVE_PLANES * sizeof *far->constant);
-  far->vectors = clt_alloc(2 * lanes + 3 * drive, sizeof *far->vectors);
-  if (far->constant == NULL || far->vectors == NULL) {
+  const size_t margin = ((size_t)far->width + 1 + LANES + PAGE - 1) / PAGE * PAGE;
+  const size_t drive = (values + 2 * margin + PAGE - 1) / PAGE * PAGE + APART;
+  const bool scaled = is_scaled(far), damped = any_is_damped(far, diagonal);
+  far->strip = clt_alloc(far->strips, sizeof *far->strip);
+  far->spill = clt_alloc(far->blocks, LANES * sizeof *far->spill);
+  far->code = clt_alloc(far->codes, 1);
+  far->vectors = clt_alloc(lanes + 3 * drive, sizeof *far->vectors);
+  far->scale = scaled ? clt_alloc(lanes, sizeof *far->scale) : NULL;
+  far->diagonal = damped ? clt_alloc(lanes, sizeof *far->diagonal) : NULL;
+  if (far->strip == NULL || far->spill == NULL || far->code == NULL || far->vectors == NULL ||
+      (scaled && far->scale == NULL) || (damped && far->diagonal == NULL)) {
     return fail(far, error);
   }
-  far->wanted = far->vectors;
-  far->shown = far->vectors + lanes;
-  for (size_t k = 0; k < 3; k++) {
-    far->drive[k] = far->vectors + 2 * lanes + k * drive + margin;
-  }
+  place_drives(far, margin, drive);
   return CLT_OK;
 }
 
-clt_status clt_live_pack(clt_far *far, const float *inverse, clt_error *error) {
-  const bool near = joins_neighbours(far);
-  far->strips = count_strips(far);
-  clt_status status = reserve(far, error);
-  if (status != CLT_OK) {
-    return status;
-  }
-  far->around = near ? clt_alloc(far->strips, 1) : NULL;
-  if (near && far->around == NULL) {
-    return fail(far, error);
-  }
-  find_places(far, inverse, near);
-  far->spill = near ? clt_alloc(far->blocks + 1, LANES * sizeof *far->spill) : NULL;
-  if (near && far->spill == NULL) {
-    return fail(far, error);
-  }
-  for (size_t k = 0; k < far->items; k++) {
-    pack_constants(far, &far->item[k], inverse);
-    if (near) {
-      pack_near(far, &far->item[k], inverse);
+static void tabulate_places(clt_far *far) {
+  for (int32_t side = 1; side <= CLT_LEAF_SIDE_MAX; side++) {
+    for (int32_t k = 0; k < CLT_LEAF_SIDE_MAX; k++) {
+      far->place[CLT_LEAF_SIDE_MAX * side + k] = (float)clt_leaf_place(k, side);
     }
   }
-  return CLT_OK;
+  for (int32_t code = 0; code < CLT_LIVE_CODES; code++) {
+    const int32_t direction = code % CLT_LIVE_AROUND, place = direction + (direction >= CLT_LIVE_AROUND / 2);
+    far->offset[code] = (ptrdiff_t)(code / CLT_LIVE_AROUND + place / 3 - 1) * far->width + place % 3 - 1;
+  }
+}
+
+clt_status clt_live_pack(clt_far *far, const float *diagonal, const float *const *black, clt_error *error) {
+  far->scattered = !joins_neighbours(far);
+  far->strips = far->blocks = far->codes = 0;
+  tabulate_places(far);
+  find_places(far, diagonal);
+  const clt_status status = reserve(far, diagonal, error);
+  for (size_t k = 0; status == CLT_OK && k < far->items; k++) {
+    clt_live_item *item = &far->item[k];
+    const float *lit = diagonal + (size_t)item->channel * far->cells;
+    pack_strips(far, item, lit, black[item->channel]);
+    pack_spill(far, item, lit);
+    if (item->damped) {
+      pack_diagonal(far, item, lit);
+    }
+  }
+  return status;
+}
+
+void clt_live_unpack(clt_far *far) {
+  free(far->strip);
+  free(far->scale);
+  free(far->diagonal);
+  free(far->vectors);
+  free(far->code);
+  free(far->spill);
 }

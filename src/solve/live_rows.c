@@ -11,14 +11,20 @@
 enum { LANES = CLT_LIVE_LANES };
 typedef float lanes __attribute__((vector_size(LANES * sizeof(float))));
 typedef int32_t marks __attribute__((vector_size(LANES * sizeof(int32_t)))); /* all bits or none */
+typedef uint32_t unsigned_marks __attribute__((vector_size(LANES * sizeof(int32_t))));
 
 /* Vectors pass by pointers: how they pass by value depends on the processor. */
 INLINE void take(lanes *to, const float *from) {
   memcpy(to, from, sizeof *to);
 }
 
-INLINE void take_plane(lanes *to, const float *constant, clt_live_plane plane) {
-  memcpy(to, constant + (size_t)plane * LANES, sizeof *to);
+/* The halves of pairs. */
+INLINE void take_upper(lanes *to, const marks *pair) {
+  *to = __builtin_convertvector(*pair & ~0xffff, lanes);
+}
+
+INLINE void take_lower(lanes *to, const marks *pair) {
+  *to = __builtin_convertvector((marks)((unsigned_marks)*pair << 16), lanes);
 }
 
 /* The first `count` lanes; 0 in the others. */
@@ -53,30 +59,23 @@ INLINE void clip(lanes *value) {
   *value = (lanes)(((marks)*value & below) | ((marks)one & ~below));
 }
 
-/* A strip of an item on its way down the rows. */
+/* A strip of an item on its way down some rows. */
 typedef struct strip {
-  int32_t count;          /* of its lanes that are cells */
-  size_t cell, at, place; /* in a plane of a channel and of all channels, and among strips of rows */
-  size_t width;           /* of the grid: from row to row */
+  int32_t row, end, count; /* of the leaf; and how many of its lanes are cells */
+  size_t at, place;        /* in a plane of all channels, and among strips of rows */
   lanes u;
 } strip;
 
-INLINE void begin_strip(const clt_far *far, const clt_live_item *item, const clt_leaf *leaf, int32_t across, strip *s) {
+/* Strips are taken in the order in which they are packed: the first of an item, and the one after each. */
+INLINE void begin_strip(const clt_far *far, const clt_live_item *item, const clt_leaf *leaf, int32_t top,
+                        int32_t across, strip *s) {
   const int32_t left = leaf->width - across;
+  s->row = top;
+  s->end = top + clt_live_rows_below(leaf, top);
   s->count = left < LANES ? left : LANES;
-  s->width = (size_t)far->width;
-  s->cell = (size_t)leaf->y * s->width + (size_t)(leaf->x + across);
-  s->at = (size_t)item->channel * far->cells + s->cell;
-  s->place = item->first + (size_t)(across / LANES * leaf->height);
-  for (int32_t l = 0; l < LANES; l++) {
-    s->u[l] = (float)clt_leaf_place(across + l, leaf->width);
-  }
-}
-
-INLINE void next_row(strip *s) {
-  s->cell += s->width;
-  s->at += s->width;
-  s->place++;
+  s->at =
+      (size_t)item->channel * far->cells + (size_t)(leaf->y + top) * (size_t)far->width + (size_t)(leaf->x + across);
+  take(&s->u, far->place + CLT_LEAF_SIDE_MAX * leaf->width + across);
 }
 
 /* What a bilinear function is along a row. */
@@ -94,13 +93,26 @@ INLINE void add(columns *to, const lanes *value, float v) {
   to->tilted += v * *value;
 }
 
-INLINE void fold(const columns *sums, const lanes *u, float out[CLT_LEAF_TERMS]) {
-  const lanes across = sums->even * *u, both = sums->tilted * *u;
-  for (int l = 0; l < LANES; l++) {
-    out[0] += sums->even[l];
-    out[1] += across[l];
-    out[2] += sums->tilted[l];
-    out[3] += both[l];
+/* Sums over an item with 1, u, v and u v, lane by lane. */
+typedef struct terms {
+  lanes of[CLT_LEAF_TERMS];
+} terms;
+
+INLINE void add_columns(terms *to, const columns *sums, const lanes *u) {
+  to->of[0] += sums->even;
+  to->of[1] += sums->even * *u;
+  to->of[2] += sums->tilted;
+  to->of[3] += sums->tilted * *u;
+}
+
+INLINE float fold(const lanes *sums) {
+  const lanes s = *sums;
+  return ((s[0] + s[4]) + (s[1] + s[5])) + ((s[2] + s[6]) + (s[3] + s[7]));
+}
+
+INLINE void fold_terms(const terms *sums, float unit, float out[CLT_LEAF_TERMS]) {
+  for (int t = 0; t < CLT_LEAF_TERMS; t++) {
+    out[t] = unit * fold(&sums->of[t]);
   }
 }
 
@@ -112,123 +124,209 @@ INLINE double fold_plain(const lanes *sums) {
   return sum;
 }
 
-/* near = O x over a strip of a row; *spill moves on. */
-INLINE void add_spill(const clt_far *far, const strip *s, const float **spill, lanes *near) {
-  const ptrdiff_t line = (ptrdiff_t)s->width;
-  const ptrdiff_t offset[CLT_LIVE_AROUND] = {-line - 1, -line, -line + 1, -1, 1, line - 1, line, line + 1};
-  const float *x = far->drive[far->now] + s->at;
-  for (unsigned around = far->around[s->place]; around != 0; around &= around - 1) {
-    lanes share, light;
-    take(&share, *spill);
-    take(&light, x + offset[__builtin_ctz(around)]);
-    *near += share * light;
-    *spill += LANES;
+/* An item as a pass goes over it, in locals: what is written through pointers cannot be these. Gather, black, flood and
+ * near light are multiples of units, which are put to what they are multiplied with, and to sums. */
+typedef struct view {
+  const clt_live_strip *strip;
+  const float *scale, *diagonal, *x, *target; /* scale and diagonal may be NULL; the last two lie as pictures */
+  float *shown;
+  const int32_t *spill;
+  const unsigned char *code;
+  const float *places; /* of rows */
+  size_t width;
+  int32_t bounded;         /* marks that are set where bounds hold */
+  float black, unit, mean; /* units of black and of spill; and the drive's mean */
+  float far[CLT_LEAF_TERMS], pull[CLT_LEAF_TERMS], turn[CLT_LEAF_TERMS];
+  bool pulled; /* pull is not 0 */
+  const ptrdiff_t *offset;
+  bool scattered;
+} view;
+
+INLINE void see(const clt_far *far, const clt_live_item *item, const clt_leaf *leaf, view *w) {
+  const float *pull = item->pull, gather = item->unit[CLT_LIVE_GATHER];
+  *w = (view){.strip = far->strip,
+              .scale = far->scale,
+              .diagonal = item->damped ? far->diagonal : NULL,
+              .x = far->drive[far->now],
+              .target = far->target,
+              .shown = far->shown,
+              .spill = far->spill + item->block * LANES,
+              .code = far->code + item->code,
+              .places = far->place + CLT_LEAF_SIDE_MAX * leaf->height,
+              .width = (size_t)far->width,
+              .bounded = far->open ? 0 : -1,
+              .black = item->unit[CLT_LIVE_BLACK],
+              .unit = item->unit[CLT_LIVE_SPILL],
+              .mean = far->mean[item->channel],
+              .pulled = pull[0] != 0 || pull[1] != 0 || pull[2] != 0 || pull[3] != 0,
+              .offset = far->offset,
+              .scattered = far->scattered};
+  for (int t = 0; t < CLT_LEAF_TERMS; t++) {
+    w->far[t] = item->far[t];
+    w->turn[t] = item->turn[t];
+    w->pull[t] = gather * pull[t];
   }
 }
 
-/* The same where near light comes from anywhere. */
-INLINE void add_near(const clt_far *far, const clt_live_item *item, const strip *s, const lanes *inverse, lanes *near) {
+INLINE void next_row(const view *w, strip *s) {
+  s->row++;
+  s->at += w->width;
+  s->place++;
+}
+
+/* What spills over to the rows that a strip is about to go down, as a multiple of the unit: flood, and near light O x.
+ */
+INLINE void take_spill(view *w, const strip *s, lanes spill[CLT_LIVE_ROWS]) {
+  const float *x = w->x + s->at;
+  for (int32_t row = 0; row < s->end - s->row; row += 2, w->spill += LANES) {
+    marks pair;
+    memcpy(&pair, w->spill, sizeof pair);
+    take_upper(&spill[row], &pair);
+    take_lower(&spill[row + 1], &pair);
+    spill[row] *= w->mean;
+    spill[row + 1] *= w->mean;
+  }
+  const unsigned char *code = w->code + 1, *end = code + 2 * *w->code;
+  for (; code < end; code += 2, w->spill += LANES) {
+    marks pair;
+    lanes upper, lower, from, beside;
+    memcpy(&pair, w->spill, sizeof pair);
+    take_upper(&upper, &pair);
+    take_lower(&lower, &pair);
+    take(&from, x + w->offset[code[0]]);
+    take(&beside, x + w->offset[code[1]]);
+    spill[code[0] / CLT_LIVE_AROUND] += upper * from;
+    spill[code[1] / CLT_LIVE_AROUND] += lower * beside;
+  }
+  w->code = end;
+}
+
+/* near = O x over a strip of a row where it comes from anywhere. */
+INLINE void add_near(const clt_far *far, const clt_live_item *item, const strip *s, lanes *near) {
   const clt_hierarchy_storage *own = far->hierarchy;
-  const float *x = far->drive[far->now] + (size_t)item->channel * far->cells;
+  const size_t base = (size_t)item->channel * far->cells;
+  const float *x = far->drive[far->now] + base;
   const float *value = own->value + (size_t)item->channel * (size_t)own->start[far->cells];
   for (int32_t l = 0; l < s->count; l++) {
+    const size_t cell = s->at - base + (size_t)l;
     float sum = 0;
-    for (int64_t e = own->start[s->cell + (size_t)l]; e < own->start[s->cell + (size_t)l + 1]; e++) {
+    for (int64_t e = own->start[cell]; e < own->start[cell + 1]; e++) {
       sum += value[e] * x[own->cell[e]];
     }
-    (*near)[l] = (*inverse)[l] > 0 ? sum : 0;
+    (*near)[l] = sum;
+  }
+}
+
+/* What passes know of a strip of a row. */
+typedef struct cells {
+  lanes own, inverse, gather, black, scale, x; /* inverse: 1 / D */
+  marks lit;
+} cells;
+
+INLINE void take_cells(const view *w, const strip *s, cells *c) {
+  const lanes none = {0}, one = none + 1;
+  const clt_live_strip *constant = &w->strip[s->place];
+  marks pair;
+  memcpy(&pair, constant->pair, sizeof pair);
+  take_upper(&c->gather, &pair);
+  take_lower(&c->black, &pair);
+  take(&c->own, constant->own);
+  take(&c->x, w->x + s->at);
+  lanes diagonal = c->own;
+  if (w->diagonal != NULL) {
+    take(&diagonal, w->diagonal + s->place * LANES);
+  }
+  c->lit = diagonal > none;
+  c->inverse = (lanes)((marks)(one / diagonal) & c->lit);
+  c->scale = one;
+  if (w->scale != NULL) {
+    take(&c->scale, w->scale + s->place * LANES);
+  }
+}
+
+/* The target, and b, which is 0 at dark cells. */
+INLINE void want(const view *w, const strip *s, const cells *c, lanes *target, lanes *wanted) {
+  take_part(target, w->target + s->at, s->count);
+  *wanted = (lanes)((marks)(*target - w->black * c->black) & c->lit);
+}
+
+/* r of the light that is known. */
+INLINE void leave(const view *w, const strip *s, const cells *c, lanes *target, lanes *wanted, lanes *r) {
+  lanes light;
+  take(&light, w->shown + s->place * LANES);
+  want(w, s, c, target, wanted);
+  *r = *wanted - light;
+}
+
+/* to = r + P pull / D, which is what a cell goes by. */
+INLINE void add_pull(const view *w, const strip *s, const cells *c, float v, lanes *to) {
+  if (w->pulled) {
+    lanes pull;
+    spread(&pull, w->pull, v, &s->u);
+    *to += c->gather * c->inverse * pull;
   }
 }
 
 /* The drive to which a cell would go from r, and where it is held at a bound. */
-INLINE void want(const clt_far *far, const float *constant, const lanes *x, const lanes *r, const lanes *pull,
-                 lanes *wish, marks *held) {
+INLINE void wish_for(const view *w, const strip *s, const cells *c, float v, const lanes *r, lanes *wish, marks *held) {
   const lanes none = {0}, one = none + 1;
-  lanes inverse, gather;
-  take_plane(&inverse, constant, CLT_LIVE_INVERSE);
-  take_plane(&gather, constant, CLT_LIVE_GATHER);
-  *wish = *x + inverse * (*r + gather * inverse * *pull);
-  const int32_t bounded = far->open ? 0 : -1;
-  *held = ((*wish <= none) | (*wish >= one)) & (inverse > none) & bounded;
+  lanes by = *r;
+  add_pull(w, s, c, v, &by);
+  *wish = c->x + c->inverse * by;
+  *held = ((*wish <= none) | (*wish >= one)) & c->lit & w->bounded;
 }
 
-/* What is added up over a strip. */
-typedef struct look_sums {
+/* What is added up over some rows of a strip, and over an item. */
+typedef struct look_columns {
   columns give, take, whole, held;
-  lanes residual, gap, size;
+} look_columns;
+typedef struct look_sums {
+  terms give, take, whole, held;
+  lanes residual, gap, size, seen;
 } look_sums;
 
 /* From r on: what a cell does and how far the bounds let it go. */
-INLINE void judge(const clt_far *far, const clt_live_item *item, const strip *s, const float *constant, float v,
-                  const lanes *x, const lanes *r, look_sums *sums) {
+INLINE void judge(const view *w, const strip *s, const cells *c, float v, const lanes *r, look_columns *down,
+                  look_sums *sums) {
   const lanes none = {0}, one = none + 1;
-  lanes own, scale, gather, pull, wish;
+  lanes wish;
   marks held;
-  take_plane(&own, constant, CLT_LIVE_OWN);
-  take_plane(&scale, constant, CLT_LIVE_SCALE);
-  take_plane(&gather, constant, CLT_LIVE_GATHER);
-  spread(&pull, item->pull, v, &s->u);
-  want(far, constant, x, r, &pull, &wish, &held);
+  wish_for(w, s, c, v, r, &wish, &held);
   lanes within = wish;
   clip(&within);
-  const lanes bounded = own * (within - *x), step = far->open ? wish - *x : within - *x;
-  const lanes give = gather * step, whole = scale * *r, rest = scale * (*r - own * step);
+  const lanes bounded = c->own * (within - c->x), step = w->bounded ? within - c->x : wish - c->x;
+  const lanes give = c->gather * step, whole = c->scale * *r, rest = c->scale * (*r - c->own * step);
   const lanes holds = (lanes)((marks)one & held);
-  add(&sums->give, &give, v);
-  add(&sums->take, &rest, v);
-  add(&sums->whole, &whole, v);
-  add(&sums->held, &holds, v);
+  add(&down->give, &give, v);
+  add(&down->take, &rest, v);
+  add(&down->whole, &whole, v);
+  add(&down->held, &holds, v);
   sums->residual += *r * *r;
   sums->gap += bounded * bounded;
 }
 
 /* The target's part of a strip of a row: r from the light that is known. */
-INLINE void aim_row(const clt_far *far, const clt_live_item *item, const strip *s, float v, look_sums *sums) {
-  const float *constant = far->constant + s->place * CLT_LIVE_PLANES * LANES;
-  const lanes none = {0};
-  lanes target, black, light, inverse, x;
-  take_part(&target, far->target + s->at, s->count);
-  take_part(&black, far->black[item->channel] + s->cell, s->count);
-  take(&light, far->shown + s->place * LANES);
-  take(&x, far->drive[far->now] + s->at);
-  take_plane(&inverse, constant, CLT_LIVE_INVERSE);
-  const lanes wanted = (lanes)((marks)(target - black) & (inverse > none)), r = wanted - light;
-  memcpy(far->wanted + s->place * LANES, &wanted, sizeof wanted);
-  sums->size += wanted * wanted;
-  judge(far, item, s, constant, v, &x, &r, sums);
+INLINE void aim_row(const view *w, const strip *s, const cells *c, look_sums *sums, lanes *r) {
+  lanes target, wanted;
+  leave(w, s, c, &target, &wanted, r);
+  sums->size += target * (lanes)((marks)target & c->lit); /* not a number where a dark cell's target is none */
+  sums->seen += wanted * wanted;
 }
 
 /* The light of the drive over a strip of a row, and r from it; the far light is bilinear along it. */
-INLINE void look_row(const clt_far *far, const clt_live_item *item, const strip *s, float v, const float **spill,
-                     look_sums *sums) {
-  const float *constant = far->constant + s->place * CLT_LIVE_PLANES * LANES;
-  lanes own, inverse, scale, flood, x, wanted, light, near = {0};
-  take_plane(&own, constant, CLT_LIVE_OWN);
-  take_plane(&inverse, constant, CLT_LIVE_INVERSE);
-  take_plane(&scale, constant, CLT_LIVE_SCALE);
-  take_plane(&flood, constant, CLT_LIVE_FLOOD);
-  take(&x, far->drive[far->now] + s->at);
-  take(&wanted, far->wanted + s->place * LANES);
-  if (far->spill != NULL) {
-    add_spill(far, s, spill, &near);
-  } else {
-    add_near(far, item, s, &inverse, &near);
+INLINE void look_row(const clt_far *far, const clt_live_item *item, const view *w, const strip *s, const cells *c,
+                     float v, const lanes *spill, look_sums *sums, lanes *r) {
+  lanes target, wanted, light, near = {0};
+  if (w->scattered) {
+    add_near(far, item, s, &near);
   }
-  spread(&light, item->far, v, &s->u);
-  light = own * x + near + scale * light + flood * far->mean[item->channel];
-  memcpy(far->shown + s->place * LANES, &light, sizeof light);
-  const lanes r = wanted - light;
-  sums->size += light * light;
-  judge(far, item, s, constant, v, &x, &r, sums);
-}
-
-INLINE void clear(clt_live_item *item) {
-  static const float NONE[CLT_LEAF_TERMS] = {0};
-  memcpy(item->give, NONE, sizeof NONE);
-  memcpy(item->take, NONE, sizeof NONE);
-  memcpy(item->whole, NONE, sizeof NONE);
-  memcpy(item->held, NONE, sizeof NONE);
-  item->residual = item->gap = 0;
+  spread(&light, w->far, v, &s->u);
+  light = c->own * c->x + (near + w->unit * *spill) + c->scale * light;
+  light = (lanes)((marks)light & c->lit);
+  memcpy(w->shown + s->place * LANES, &light, sizeof light);
+  want(w, s, c, &target, &wanted);
+  *r = wanted - light;
+  sums->seen += light * light;
 }
 
 /* The item that a thread most likely takes after this one. */
@@ -236,92 +334,111 @@ INLINE const clt_live_item *next_item(const clt_far *far, const clt_live_item *i
   return item + 1 < far->item + far->items ? item + 1 : item;
 }
 
-/* Asks memory for a plane's rows over an item to come, which lie too far apart to be foreseen; into the second cache,
- * for in the first they would push each other out. */
-INLINE void foresee(const clt_far *far, const clt_live_item *item, const float *plane) {
+/* Asks memory for some of a plane's rows over an item to come, which lie too far apart to be foreseen; into the second
+ * cache, for in the first they would push each other out. `plane` is of all channels. */
+INLINE void foresee(const clt_far *far, const clt_live_item *item, const float *plane, int32_t row, int32_t end) {
   enum { LINE = 16, SECOND = 2 };
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
-  const float *row = plane + (size_t)leaf.y * (size_t)far->width + (size_t)leaf.x;
-  for (int32_t k = 0; k < leaf.height; k++, row += far->width) {
+  const float *at = plane + (size_t)item->channel * far->cells + (size_t)(leaf.y + row) * (size_t)far->width;
+  for (int32_t k = row; k < end && k < leaf.height; k++, at += far->width) {
     for (int32_t across = 0; across < leaf.width; across += LINE) {
-      __builtin_prefetch(row + across, 0, SECOND);
+      __builtin_prefetch(at + leaf.x + across, 0, SECOND);
     }
   }
+}
+
+/* The rows of the next item to ask for while this one's from `top` on are passed over. */
+INLINE int32_t foreseen(const clt_leaf *leaf, int32_t top) {
+  return top + CLT_LIVE_ROWS < leaf->height ? top + CLT_LIVE_ROWS : CLT_LEAF_SIDE_MAX;
+}
+
+INLINE void tell(const look_sums *sums, bool aims, clt_live_item *item) {
+  fold_terms(&sums->give, item->unit[CLT_LIVE_GATHER], item->give);
+  fold_terms(&sums->take, 1, item->take);
+  fold_terms(&sums->whole, 1, item->whole);
+  fold_terms(&sums->held, 1, item->held);
+  item->residual = fold_plain(&sums->residual);
+  item->gap = fold_plain(&sums->gap);
+  *(aims ? &item->wanted : &item->seen) = fold_plain(&sums->seen);
+  item->size = aims ? fold_plain(&sums->size) : item->size;
 }
 
 INLINE void pass(const clt_far *far, clt_live_item *item, bool aims) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
-  const float *spill = far->spill != NULL ? far->spill + item->block * LANES : NULL;
   const clt_live_item *next = next_item(far, item);
-  double size = 0;
-  clear(item);
-  foresee(far, next, far->drive[far->now] + (size_t)next->channel * far->cells);
-  if (aims) {
-    foresee(far, next, far->target + (size_t)next->channel * far->cells);
-    foresee(far, next, far->black[next->channel]);
-  }
-  for (int32_t across = 0; across < leaf.width; across += LANES) {
-    look_sums sums = {0};
-    strip s;
-    begin_strip(far, item, &leaf, across, &s);
-    for (int32_t row = 0; row < leaf.height; row++, next_row(&s)) {
-      const float v = (float)clt_leaf_place(row, leaf.height);
-      if (aims) {
-        aim_row(far, item, &s, v, &sums);
-      } else {
-        look_row(far, item, &s, v, &spill, &sums);
+  look_sums sums = {0};
+  strip s = {.place = item->first};
+  view w;
+  see(far, item, &leaf, &w);
+  for (int32_t top = 0; top < leaf.height; top += CLT_LIVE_ROWS) {
+    foresee(far, next, w.x, top, foreseen(&leaf, top));
+    foresee(far, next, w.target, top, foreseen(&leaf, top));
+    for (int32_t across = 0; across < leaf.width; across += LANES) {
+      look_columns down = {0};
+      lanes spill[CLT_LIVE_ROWS];
+      begin_strip(far, item, &leaf, top, across, &s);
+      if (!aims) {
+        take_spill(&w, &s, spill);
       }
+      for (; s.row < s.end; next_row(&w, &s)) {
+        const float v = w.places[s.row];
+        cells c;
+        lanes r;
+        take_cells(&w, &s, &c);
+        if (aims) {
+          aim_row(&w, &s, &c, &sums, &r);
+        } else {
+          look_row(far, item, &w, &s, &c, v, &spill[s.row - top], &sums, &r);
+        }
+        judge(&w, &s, &c, v, &r, &down, &sums);
+      }
+      add_columns(&sums.give, &down.give, &s.u);
+      add_columns(&sums.take, &down.take, &s.u);
+      add_columns(&sums.whole, &down.whole, &s.u);
+      add_columns(&sums.held, &down.held, &s.u);
     }
-    fold(&sums.give, &s.u, item->give);
-    fold(&sums.take, &s.u, item->take);
-    fold(&sums.whole, &s.u, item->whole);
-    fold(&sums.held, &s.u, item->held);
-    item->residual += fold_plain(&sums.residual);
-    item->gap += fold_plain(&sums.gap);
-    size += fold_plain(&sums.size);
   }
-  *(aims ? &item->wanted : &item->seen) = size;
+  tell(&sums, aims, item);
 }
 
-INLINE void move_row(const clt_far *far, const clt_live_item *item, const strip *s, float v, float *next,
-                     columns *given, lanes *light) {
-  const float *constant = far->constant + s->place * CLT_LIVE_PLANES * LANES;
-  lanes inverse, scale, gather, x, wanted, shown, turn, pull;
-  take_plane(&inverse, constant, CLT_LIVE_INVERSE);
-  take_plane(&scale, constant, CLT_LIVE_SCALE);
-  take_plane(&gather, constant, CLT_LIVE_GATHER);
-  take(&x, far->drive[far->now] + s->at);
-  take(&wanted, far->wanted + s->place * LANES);
-  take(&shown, far->shown + s->place * LANES);
-  spread(&turn, item->turn, v, &s->u);
-  spread(&pull, item->pull, v, &s->u);
-  const lanes none = {0}, r = wanted - shown;
-  lanes to = x + inverse * (r - scale * turn + gather * inverse * pull);
+INLINE void move_row(const view *w, const strip *s, float v, float *next, columns *given, lanes *light) {
+  lanes target, wanted, by, turn;
+  cells c;
+  take_cells(w, s, &c);
+  leave(w, s, &c, &target, &wanted, &by);
+  spread(&turn, w->turn, v, &s->u);
+  by -= c.scale * turn;
+  add_pull(w, s, &c, v, &by);
+  lanes to = c.x + c.inverse * by;
   clip(&to);
   put_part(next + s->at, &to, s->count);
-  const lanes gives = gather * to;
+  const lanes gives = c.gather * to;
   add(given, &gives, v);
-  *light += (lanes)((marks)to & (inverse > none));
+  *light += (lanes)((marks)to & c.lit);
 }
 
 INLINE void move(const clt_far *far, clt_live_item *item, float *next) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
   const clt_live_item *behind = next_item(far, item);
-  memset(item->given, 0, sizeof item->given);
-  item->light = 0;
-  foresee(far, behind, far->drive[far->now] + (size_t)behind->channel * far->cells);
-  foresee(far, behind, next + (size_t)behind->channel * far->cells);
-  for (int32_t across = 0; across < leaf.width; across += LANES) {
-    columns given = {0};
-    lanes light = {0};
-    strip s;
-    begin_strip(far, item, &leaf, across, &s);
-    for (int32_t row = 0; row < leaf.height; row++, next_row(&s)) {
-      move_row(far, item, &s, (float)clt_leaf_place(row, leaf.height), next, &given, &light);
+  terms given = {0};
+  lanes light = {0};
+  strip s = {.place = item->first};
+  view w;
+  see(far, item, &leaf, &w);
+  for (int32_t top = 0; top < leaf.height; top += CLT_LIVE_ROWS) {
+    foresee(far, behind, w.x, top, foreseen(&leaf, top));
+    foresee(far, behind, w.target, top, foreseen(&leaf, top));
+    foresee(far, behind, next, top, foreseen(&leaf, top));
+    for (int32_t across = 0; across < leaf.width; across += LANES) {
+      columns down = {0};
+      for (begin_strip(far, item, &leaf, top, across, &s); s.row < s.end; next_row(&w, &s)) {
+        move_row(&w, &s, w.places[s.row], next, &down, &light);
+      }
+      add_columns(&given, &down, &s.u);
     }
-    fold(&given, &s.u, item->given);
-    item->light += fold_plain(&light);
   }
+  fold_terms(&given, item->unit[CLT_LIVE_GATHER], item->given);
+  item->light = fold_plain(&light);
 }
 
 /* The sums of one weight with v^0, v^1 and v^2. */
@@ -336,45 +453,47 @@ INLINE void add_powers(powers *to, const lanes *weight, float v) {
 }
 
 /* One row of the weights v k / D and (v / D)^2 where cells are free, k^2 where they are held. */
-INLINE void weigh_row(const clt_far *far, const clt_live_item *item, const strip *s, float v, powers sums[3]) {
-  const float *constant = far->constant + s->place * CLT_LIVE_PLANES * LANES;
-  lanes inverse, scale, gather, x, wanted, shown, pull, wish;
+INLINE void weigh_row(const view *w, const strip *s, float v, powers sums[3]) {
+  lanes target, wanted, wish, r = {0};
+  cells c;
   marks held;
-  take_plane(&inverse, constant, CLT_LIVE_INVERSE);
-  take_plane(&scale, constant, CLT_LIVE_SCALE);
-  take_plane(&gather, constant, CLT_LIVE_GATHER);
-  take(&x, far->drive[far->now] + s->at);
-  take(&wanted, far->wanted + s->place * LANES);
-  take(&shown, far->shown + s->place * LANES);
-  spread(&pull, item->pull, v, &s->u);
-  const lanes r = wanted - shown;
-  want(far, constant, &x, &r, &pull, &wish, &held);
-  const lanes free = (lanes)((marks)(gather * inverse) & ~held), bound = (lanes)((marks)scale & held);
-  const lanes both = free * scale, pulls = free * free, pushes = bound * bound;
+  take_cells(w, s, &c);
+  if (w->bounded) { /* else no cell is held, whatever is left, and there may be no target */
+    leave(w, s, &c, &target, &wanted, &r);
+  }
+  wish_for(w, s, &c, v, &r, &wish, &held);
+  const lanes free = (lanes)((marks)(c.gather * c.inverse) & ~held), bound = (lanes)((marks)c.scale & held);
+  const lanes both = free * c.scale, pulled = free * free, pushed = bound * bound;
   add_powers(&sums[0], &both, v);
-  add_powers(&sums[1], &pulls, v);
-  add_powers(&sums[2], &pushes, v);
+  add_powers(&sums[1], &pulled, v);
+  add_powers(&sums[2], &pushed, v);
 }
 
 INLINE void weigh(const clt_far *far, clt_live_item *item) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
-  memset(item->weight, 0, sizeof item->weight);
-  for (int32_t across = 0; across < leaf.width; across += LANES) {
-    powers sums[3] = {0};
-    strip s;
-    begin_strip(far, item, &leaf, across, &s);
-    for (int32_t row = 0; row < leaf.height; row++, next_row(&s)) {
-      weigh_row(far, item, &s, (float)clt_leaf_place(row, leaf.height), sums);
-    }
-    for (int k = 0; k < 3 * 3; k++) {
-      const lanes *sum = &sums[k / 3].of[k % 3];
-      float *moment = item->weight[k / 3] + 3 * (k % 3);
-      for (int l = 0; l < LANES; l++) {
-        moment[0] += (*sum)[l];
-        moment[1] += (*sum)[l] * s.u[l];
-        moment[2] += (*sum)[l] * s.u[l] * s.u[l];
+  const float gather = item->unit[CLT_LIVE_GATHER], unit[3] = {gather, gather * gather, 1};
+  lanes moment[3][CLT_LIVE_MOMENTS] = {0};
+  strip s = {.place = item->first};
+  view w;
+  see(far, item, &leaf, &w);
+  for (int32_t top = 0; top < leaf.height; top += CLT_LIVE_ROWS) {
+    for (int32_t across = 0; across < leaf.width; across += LANES) {
+      powers sums[3] = {0};
+      for (begin_strip(far, item, &leaf, top, across, &s); s.row < s.end; next_row(&w, &s)) {
+        weigh_row(&w, &s, w.places[s.row], sums);
+      }
+      for (int k = 0; k < 3 * 3; k++) {
+        const lanes *sum = &sums[k / 3].of[k % 3];
+        lanes *to = moment[k / 3] + 3 * (k % 3);
+        to[0] += *sum;
+        to[1] += *sum * s.u;
+        to[2] += *sum * s.u * s.u;
       }
     }
+  }
+  for (int k = 0; k < 3 * CLT_LIVE_MOMENTS; k++) {
+    const int weight = k / CLT_LIVE_MOMENTS, m = k % CLT_LIVE_MOMENTS;
+    item->weight[weight][m] = unit[weight] * fold(&moment[weight][m]);
   }
 }
 
@@ -415,7 +534,14 @@ static bool has_avx2(void) {
 #define NEEDS_avx2 "AVX2"
 VARIANT(avx2, __attribute__((target("avx2"))))
 
-const clt_live_kernels *const clt_live_variants[] = {&avx2, &portable, NULL};
+static bool has_avx512(void) {
+  return __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq");
+}
+
+#define NEEDS_avx512 "AVX-512"
+VARIANT(avx512, __attribute__((target("avx512f,avx512vl,avx512dq,prefer-vector-width=256"))))
+
+const clt_live_kernels *const clt_live_variants[] = {&avx512, &avx2, &portable, NULL};
 #else
 const clt_live_kernels *const clt_live_variants[] = {&portable, NULL};
 #endif
