@@ -85,7 +85,9 @@ CLT_PUBLIC clt_status clt_transport_create_blocks(int width, int height, int cha
 
 /* Makes a transport in "hierarchy" storage: near light as it is, far light by the leaves of a block tree over which it
  * varies bilinearly, so that a product reads little more than one number a cell, and noise is smoothed. Every row keeps
- * its sum. Black, flood, deviations and provenance are copied. tolerance is 0 or more, below 1.
+ * its sum. Black, flood, deviations and provenance are copied. tolerance is 0 or more, below 1. Channels share one pair
+ * of factors where that takes less room, and factors are kept in the fewest bits (8, 16, 32) that change products by no
+ * more than .3 of the tolerance; then their sums are float.
  * From "blocks" storage: tolerance is the rms of a cell's light, all blocks together and relative to its own, that a
  * leaf may leave out; noise is not told by finer leaves either. Time and memory grow with the cells times the blocks.
  * From any other storage of a square T, by its rows: tolerance is the root of the sum of squares of the entries that

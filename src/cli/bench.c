@@ -22,7 +22,8 @@ static json_t *kernels_json(const clt_bench_report *report) {
   json_t *all = json_array();
   for (int k = 0; k < report->kernel_count; k++) {
     const clt_bench_kernel *kernel = &report->kernel[k];
-    json_array_append_new(all, json_pack("{s:s, s:f, s:f, s:f}", "name", kernel->name, "bytes", kernel->bytes, "ms",
+    json_array_append_new(all, json_pack("{s:s, s:f, s:f, s:f, s:f}", "name", kernel->name, "bytes", kernel->bytes,
+                                         "bytes_per_cell", kernel->bytes / (double)report->frame.cells, "ms",
                                          kernel->ms, "fraction", kernel->fraction));
   }
   return all;
@@ -87,8 +88,8 @@ static void print_report(const clt_bench_report *report) {
   printf("memory      %.1f GB/s read\n", report->bandwidth_gbs);
   for (int k = 0; k < report->kernel_count; k++) {
     const clt_bench_kernel *kernel = &report->kernel[k];
-    printf("%-22s %8.1f MB %9.3f ms %4.0f %% of the read\n", kernel->name, 1e-6 * kernel->bytes, kernel->ms,
-           100 * kernel->fraction);
+    printf("%-22s %8.1f MB (%.0f B a cell) %9.3f ms %4.0f %% of the read\n", kernel->name, 1e-6 * kernel->bytes,
+           kernel->bytes / (double)report->frame.cells, kernel->ms, 100 * kernel->fraction);
   }
   print_frame("frames", &report->frame);
   print_frame("frames held", &report->held);

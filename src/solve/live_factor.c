@@ -27,9 +27,17 @@ typedef struct product {
 static const product G = {0, false, true}, H = {1, false, false}, N = {2, true, true};
 static const product *const products[PRODUCTS] = {&G, &H, &N};
 
-static const float *side_of(const clt_far *far, bool left, int channel) {
-  const clt_hierarchy_storage *of = far->hierarchy;
-  return (left ? of->left : of->right) + (size_t)channel * TERMS * of->leaves * far->rank;
+/* Both sides of a channel's far light in floats, U = diag(k) P left and V = diag(v) P right: the first columns of each
+ * of 4L rows. */
+typedef struct sides {
+  const float *left, *right;
+  size_t columns;
+} sides;
+
+static sides coupled_of(const clt_far *far, int channel) {
+  const size_t nodes = TERMS * far->hierarchy->leaves, count = far->coupled[channel];
+  const float *both = far->columns[channel];
+  return (sides){both, both + nodes * count, count};
 }
 
 static clt_live_item *items_of(const clt_far *far, int channel) {
@@ -49,15 +57,13 @@ static float *product_of(const clt_far *far, int channel, int k) {
   return far->product + (size_t)(channel * PRODUCTS + k) * (far->order / 2) * (far->order / 2);
 }
 
-/* to = M from over a leaf: the entry of M for the terms u^a v^b and u^c v^d is the moment of u^(a+c) v^(b+d). Rows of
- * `from` are rank apart. */
-static void weigh_rows(const float moment[CLT_LIVE_MOMENTS], const float *from, size_t rank, size_t columns,
-                       float *to) {
+/* to = M from over a leaf: the entry of M for the terms u^a v^b and u^c v^d is the moment of u^(a+c) v^(b+d). */
+static void weigh_rows(const float moment[CLT_LIVE_MOMENTS], const float *from, size_t columns, float *to) {
   for (size_t s = 0; s < TERMS; s++) {
     const float *of = moment + 3 * (s / 2) + s % 2;
     for (size_t r = 0; r < columns; r++) {
-      to[s * columns + r] =
-          (of[0] * from[r] + of[1] * from[rank + r]) + (of[3] * from[2 * rank + r] + of[4] * from[3 * rank + r]);
+      to[s * columns + r] = (of[0] * from[r] + of[1] * from[columns + r]) +
+                            (of[3] * from[2 * columns + r] + of[4] * from[3 * columns + r]);
     }
   }
 }
@@ -86,21 +92,18 @@ static void add_product(const float *plain, const float *weighed, size_t rows, s
   }
 }
 
-/* Brings sum = factor' M other up to date with the weights, over the first columns; column-major. Of a symmetric
- * product the lower half. */
-static void update_product(const clt_far *far, int channel, const product *of, size_t columns, float *room,
-                           float *sum) {
+/* Brings sum = factor' M other up to date with the weights; column-major. Of a symmetric product the lower half. */
+static void update_product(const clt_far *far, int channel, const product *of, sides from, float *room, float *sum) {
   float *plain = room, *weighed = room + room_size(far) / 2, change[CLT_LIVE_MOMENTS];
-  const size_t leaves = far->hierarchy->leaves, rank = far->rank;
-  const float *factor = side_of(far, of->factor_left, channel), *other = side_of(far, of->other_left, channel);
+  const size_t leaves = far->hierarchy->leaves, columns = from.columns;
+  const float *factor = of->factor_left ? from.left : from.right, *other = of->other_left ? from.left : from.right;
   for (size_t leaf = 0; leaf < leaves;) {
     size_t rows = 0;
     for (; leaf < leaves && rows < TERMS * LEAVES_AT_ONCE; leaf++) {
       if (has_changed(&items_of(far, channel)[leaf], of->weight, change)) {
-        weigh_rows(change, other + TERMS * leaf * rank, rank, columns, weighed + rows * columns);
-        for (size_t t = 0; t < TERMS; t++, rows++) {
-          memcpy(plain + rows * columns, factor + (TERMS * leaf + t) * rank, columns * sizeof *plain);
-        }
+        weigh_rows(change, other + TERMS * leaf * columns, columns, weighed + rows * columns);
+        memcpy(plain + rows * columns, factor + TERMS * leaf * columns, TERMS * columns * sizeof *plain);
+        rows += TERMS;
       }
     }
     add_product(plain, weighed, rows, columns, of->factor_left == of->other_left, sum);
@@ -113,49 +116,82 @@ static float lower_of(const float *sum, size_t columns, size_t i, size_t j) {
 }
 
 /* squares_r = side_r' M side_r, M the moments of v k / D. */
-static void measure_columns(const clt_far *far, int channel, const float *side, float *room, double *squares) {
+static void measure_columns(const clt_far *far, int channel, const float *side, double *squares) {
   const size_t rank = far->rank;
   memset(squares, 0, rank * sizeof *squares);
   for (size_t leaf = 0; leaf < far->hierarchy->leaves; leaf++) {
     const float *rows = side + TERMS * leaf * rank;
-    weigh_rows(items_of(far, channel)[leaf].weight[0], rows, rank, rank, room);
+    weigh_rows(items_of(far, channel)[leaf].weight[0], rows, rank, far->tall);
     for (size_t m = 0; m < TERMS * rank; m++) {
-      squares[m % rank] += (double)rows[m] * (double)room[m];
+      squares[m % rank] += (double)rows[m] * (double)far->tall[m];
     }
   }
 }
 
-/* How many columns of far light are coupled: all up to the last that is not small. */
-static clt_status choose_coupled(clt_far *far, int channel, clt_error *error) {
+/* How many columns of far light are coupled: all up to the last that is not small. squares holds 2 R. */
+static void choose_coupled(clt_far *far, int channel, sides whole, double *squares) {
   const size_t rank = far->rank;
-  double *left = clt_alloc(2 * rank, sizeof *left), *right = left + rank;
-  if (left == NULL) {
-    return clt_fail(error, CLT_FAILED, "no memory for far light of rank %zu", rank);
-  }
-  measure_columns(far, channel, side_of(far, true, channel), far->tall, left);
-  measure_columns(far, channel, side_of(far, false, channel), far->tall, right);
+  double *left = squares, *right = squares + rank;
+  measure_columns(far, channel, whole.left, left);
+  measure_columns(far, channel, whole.right, right);
   far->coupled[channel] = rank < COUPLED_LEAST ? rank : COUPLED_LEAST;
   for (size_t r = 0; r < rank; r++) {
     if (r >= far->coupled[channel] && left[r] * right[r] > (double)COUPLED * (double)COUPLED) {
       far->coupled[channel] = r + 1;
     }
   }
-  free(left);
-  return CLT_OK;
+}
+
+/* Both sides of a channel in floats, left with its core: into `both`, 2 x 4L x R; room holds 4L x R. */
+static sides read_sides(const clt_far *far, int channel, float *both, float *room) {
+  const clt_hierarchy_storage *of = far->hierarchy;
+  const size_t nodes = TERMS * of->leaves, rank = far->rank;
+  float *left = both, *right = both + nodes * rank, *plain = of->core != NULL ? room : left;
+  for (size_t leaf = 0; leaf < of->leaves; leaf++) {
+    clt_leaf_rows_read(&of->left, channel, leaf, plain + TERMS * leaf * rank);
+    clt_leaf_rows_read(&of->right, channel, leaf, right + TERMS * leaf * rank);
+  }
+  if (of->core != NULL) {
+    const blasint wide = (blasint)rank;
+    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, (blasint)nodes, wide, wide, 1, plain, wide,
+                of->core + (size_t)channel * rank * rank, wide, 0, left, wide);
+  }
+  return (sides){left, right, rank};
+}
+
+/* Keeps the columns that are coupled. */
+static bool keep_columns(clt_far *far, int channel, sides whole) {
+  const size_t nodes = TERMS * far->hierarchy->leaves, count = far->coupled[channel];
+  float *left = far->columns[channel] = clt_alloc(2 * nodes, count * sizeof *left);
+  for (size_t m = 0; left != NULL && m < nodes; m++) {
+    memcpy(left + m * count, whole.left + m * whole.columns, count * sizeof *left);
+    memcpy(left + (nodes + m) * count, whole.right + m * whole.columns, count * sizeof *left);
+  }
+  return left != NULL;
 }
 
 /* What is known of a channel where no cell is held: V' D^-2 V, and how much is coupled. */
 static clt_status prepare_channel(clt_far *far, int channel, clt_error *error) {
   clt_live_item *item = items_of(far, channel);
+  const size_t rank = far->rank, nodes = TERMS * far->hierarchy->leaves;
   for (size_t k = 0; k < far->hierarchy->leaves; k++) {
     far->kernels->weigh(far, &item[k]);
   }
-  float *gram = far->gram + (size_t)channel * far->rank * far->rank;
-  update_product(far, channel, &H, far->rank, far->tall, gram);
-  for (size_t at = 0; at < far->rank * far->rank; at++) {
-    gram[at] = lower_of(gram, far->rank, at % far->rank, at / far->rank);
+  float *tall = clt_alloc(3 * nodes, rank * sizeof *tall), *gram = far->gram + (size_t)channel * rank * rank;
+  double *squares = clt_alloc(2 * rank, sizeof *squares);
+  bool done = tall != NULL && squares != NULL;
+  if (done) {
+    const sides whole = read_sides(far, channel, tall, tall + 2 * nodes * rank);
+    update_product(far, channel, &H, whole, far->tall, gram);
+    for (size_t at = 0; at < rank * rank; at++) {
+      gram[at] = lower_of(gram, rank, at % rank, at / rank);
+    }
+    choose_coupled(far, channel, whole, squares);
+    done = keep_columns(far, channel, whole);
   }
-  return choose_coupled(far, channel, error);
+  free(tall);
+  free(squares);
+  return done ? CLT_OK : clt_fail(error, CLT_FAILED, "no memory for far light of rank %zu", rank);
 }
 
 /* The factor of a channel that serves now, and its pivots. */
@@ -206,6 +242,9 @@ void clt_factor_destroy(clt_far *far) {
   free(far->product);
   free(far->pivots);
   free(far->tall);
+  for (int c = 0; c < far->channels; c++) {
+    free(far->columns[c]);
+  }
 }
 
 static void weigh_items(clt_far *far, const bool wanted[CLT_CHANNELS_MAX]) {
@@ -231,7 +270,7 @@ static void update_products(clt_far *far, const bool wanted[CLT_CHANNELS_MAX]) {
       if (far->counts[channel] % RECOUNT == 0) {
         memset(sum, 0, count * count * sizeof *sum);
       }
-      update_product(far, channel, products[k], count, room_of(far, channel, k), sum);
+      update_product(far, channel, products[k], coupled_of(far, channel), room_of(far, channel, k), sum);
     }
   }
 }

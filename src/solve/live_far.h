@@ -80,10 +80,6 @@ typedef struct clt_live_kernels {
   void (*move)(const clt_far *far, clt_live_item *item, float *next);
   /* The moments of the three weights, by what is held. */
   void (*weigh)(const clt_far *far, clt_live_item *item);
-  /* out_k += sum over the terms of a leaf of term_t row_tk, k < count; rows are `stride` apart. */
-  void (*add_rows)(const float *row, size_t stride, size_t count, const float term[CLT_LEAF_TERMS], float *out);
-  /* term_t = sum over k < count of row_tk in_k. */
-  void (*dot_rows)(const float *row, size_t stride, size_t count, const float *in, float term[CLT_LEAF_TERMS]);
 } clt_live_kernels;
 
 struct clt_far {
@@ -120,8 +116,10 @@ struct clt_far {
   bool bound[CLT_CHANNELS_MAX];     /* some cells are held */
   bool pulled[CLT_CHANNELS_MAX];    /* they are, or q is not 0 yet */
   bool ready[CLT_CHANNELS_MAX];     /* the factor where cells are held */
-  float *small;                     /* per channel: the four below */
-  float *z, *q, *right, *gram;      /* R, R, 2R (dz), R x R (V' D^-2 V over lit cells) */
+  float *small;                     /* per channel: the seven below */
+  float *z, *q, *right;             /* R (of U z: with the core of channels that share U), R, 2R (dz) */
+  float *turned, *folded, *gram;    /* R (dz as z), R (room), R x R (V' D^-2 V over lit cells) */
+  float *columns[CLT_CHANNELS_MAX]; /* of U and V that the factor couples, in floats: 2 x 4L x coupled */
   float *factor;                    /* per channel: two, of twice as many columns as the most that are coupled */
   size_t order;                     /* that many */
   int *pivots;                      /* of both factors: where no cell is held, and where some are */

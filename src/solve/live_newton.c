@@ -12,18 +12,6 @@ static size_t leaves_of(const clt_far *far) {
   return far->hierarchy->leaves;
 }
 
-static const float *factor_of(const clt_far *far, const float *factor, int channel) {
-  return factor + (size_t)channel * TERMS * leaves_of(far) * far->rank;
-}
-
-static const float *left_of(const clt_far *far, int channel) {
-  return factor_of(far, far->hierarchy->left, channel);
-}
-
-static const float *right_of(const clt_far *far, int channel) {
-  return factor_of(far, far->hierarchy->right, channel);
-}
-
 static clt_live_item *items_of(const clt_far *far, int channel) {
   return far->item + (size_t)channel * leaves_of(far);
 }
@@ -34,14 +22,16 @@ static float *of_channel(float *all, size_t each, int channel) {
 
 clt_status clt_newton_create(clt_far *far, clt_error *error) {
   const size_t rank = far->rank, channels = (size_t)far->channels;
-  far->small = clt_alloc(channels * rank, (4 + 2 * CHUNKS + rank) * sizeof *far->small);
+  far->small = clt_alloc(channels * rank, (6 + 2 * CHUNKS + rank) * sizeof *far->small);
   if (far->small == NULL) {
     return clt_fail(error, CLT_FAILED, "no memory for steps over far light of rank %zu", rank);
   }
   far->z = far->small;
   far->q = far->z + channels * rank;
   far->right = far->q + channels * rank;
-  far->partial = far->right + channels * 2 * rank;
+  far->turned = far->right + channels * 2 * rank;
+  far->folded = far->turned + channels * rank;
+  far->partial = far->folded + channels * rank;
   far->gram = far->partial + channels * CHUNKS * 2 * rank;
   return clt_factor_create(far, error);
 }
@@ -51,16 +41,16 @@ void clt_newton_destroy(clt_far *far) {
   free(far->small);
 }
 
-/* partial = factor' of what the items of a chunk hold at `offset`, over the first columns. */
-static void sum_chunk(const clt_far *far, int channel, size_t chunk, const float *factor, size_t columns, size_t offset,
-                      float *partial) {
-  const size_t leaves = leaves_of(far), rank = far->rank;
+/* partial = rows' of what the items of a chunk hold at `offset`, over the first columns. */
+static void sum_chunk(const clt_far *far, int channel, size_t chunk, const clt_leaf_rows *rows, size_t columns,
+                      size_t offset, float *partial) {
+  const size_t leaves = leaves_of(far);
   const clt_live_item *item = items_of(far, channel);
   memset(partial, 0, columns * sizeof *partial);
   for (size_t k = leaves * chunk / CHUNKS; k < leaves * (chunk + 1) / CHUNKS; k++) {
     const float *term = (const float *)(const void *)((const char *)&item[k] + offset);
     if (term[0] != 0 || term[1] != 0 || term[2] != 0 || term[3] != 0) {
-      far->kernels->add_rows(factor + TERMS * k * rank, rank, columns, term, partial);
+      clt_leaf_rows_add(rows, channel, k, term, columns, partial);
     }
   }
 }
@@ -69,14 +59,21 @@ static float *partial_of(const clt_far *far, int channel, size_t chunk) {
   return far->partial + ((size_t)channel * CHUNKS + chunk) * 2 * far->rank;
 }
 
-/* partial = factor' of what the items hold at `offset`, of every channel and chunk: factor is left or right, whole. */
-static void sum_items(const clt_far *far, const float *factor, size_t offset) {
+/* partial = rows' of what the items hold at `offset`, of every channel and chunk; channels that share rows read them
+ * one after the other. */
+static void sum_items(const clt_far *far, const clt_leaf_rows *rows, size_t offset) {
 #pragma omp for schedule(static)
   for (int k = 0; k < far->channels * CHUNKS; k++) {
-    const size_t chunk = (size_t)(k % CHUNKS);
-    sum_chunk(far, k / CHUNKS, chunk, factor_of(far, factor, k / CHUNKS), far->rank, offset,
-              partial_of(far, k / CHUNKS, chunk));
+    const int channel = k % far->channels;
+    const size_t chunk = (size_t)(k / far->channels);
+    sum_chunk(far, channel, chunk, rows, far->rank, offset, partial_of(far, channel, chunk));
   }
+}
+
+/* The columns that are coupled, in whole steps. */
+static size_t coupled_steps(const clt_far *far, int channel) {
+  const size_t whole = (far->coupled[channel] + CLT_RANK_STEP - 1) / CLT_RANK_STEP * CLT_RANK_STEP;
+  return whole < far->rank ? whole : far->rank;
 }
 
 /* out = the sum of a channel's partial sums, from `first` on. */
@@ -90,22 +87,39 @@ static void fold_chunks(const clt_far *far, int channel, size_t first, size_t co
   }
 }
 
-/* Right sides into answers: dz stays in far->right, dq goes into q. */
+/* out = U'(...) from what was summed over the left side's rows: the core is theirs. */
+static void fold_taken(const clt_far *far, int channel, size_t first, float *out) {
+  float *folded = of_channel(far->folded, far->rank, channel);
+  fold_chunks(far, channel, first, far->rank, folded);
+  clt_hierarchic_core(far->hierarchy, channel, true, folded, out);
+}
+
+/* dz as the left side takes it. */
+static void turn_answer(const clt_far *far, int channel, const float *answer) {
+  const size_t rank = far->rank, count = far->coupled[channel];
+  float *padded = of_channel(far->folded, rank, channel);
+  memcpy(padded, answer, count * sizeof *padded);
+  memset(padded + count, 0, (rank - count) * sizeof *padded);
+  clt_hierarchic_core(far->hierarchy, channel, false, padded, of_channel(far->turned, rank, channel));
+}
+
+/* Right sides into answers: dz stays in far->right and, turned, in far->turned; dq goes into q. */
 static void solve_channel(clt_far *far, int channel) {
   const size_t rank = far->rank, count = far->coupled[channel];
   float *answer = of_channel(far->right, 2 * rank, channel), *q = of_channel(far->q, rank, channel);
-  float *taken = answer + count;
+  float *taken = answer + count, *all = of_channel(far->turned, rank, channel);
   fold_chunks(far, channel, 0, count, answer);
   if (far->pulled[channel]) {
-    fold_chunks(far, channel, rank, count, taken);
-    fold_chunks(far, channel, rank + count, rank - count, q + count);
+    fold_taken(far, channel, rank, all);
+    memcpy(q + count, all + count, (rank - count) * sizeof *q);
     for (size_t r = 0; r < count; r++) {
-      taken[r] -= q[r];
+      taken[r] = all[r] - q[r];
     }
   } else {
     memset(taken, 0, count * sizeof *taken);
   }
   clt_factor_solve(far, channel, answer);
+  turn_answer(far, channel, answer);
   far->pulled[channel] = far->bound[channel];
   if (far->bound[channel]) {
     for (size_t r = 0; r < count; r++) {
@@ -117,16 +131,15 @@ static void solve_channel(clt_far *far, int channel) {
 }
 
 void clt_newton_step(clt_far *far) {
+  const clt_hierarchy_storage *of = far->hierarchy;
 #pragma omp for schedule(static)
   for (int k = 0; k < far->channels * CHUNKS; k++) {
-    const int channel = k / CHUNKS;
-    const size_t chunk = (size_t)(k % CHUNKS);
+    const int channel = k % far->channels;
+    const size_t chunk = (size_t)(k / far->channels);
     float *partial = partial_of(far, channel, chunk);
-    sum_chunk(far, channel, chunk, right_of(far, channel), far->coupled[channel], offsetof(clt_live_item, give),
-              partial);
+    sum_chunk(far, channel, chunk, &of->right, coupled_steps(far, channel), offsetof(clt_live_item, give), partial);
     if (far->pulled[channel]) {
-      sum_chunk(far, channel, chunk, left_of(far, channel), far->rank, offsetof(clt_live_item, take),
-                partial + far->rank);
+      sum_chunk(far, channel, chunk, &of->left, far->rank, offsetof(clt_live_item, take), partial + far->rank);
     }
   }
 #pragma omp for schedule(dynamic, 1)
@@ -136,33 +149,35 @@ void clt_newton_step(clt_far *far) {
 }
 
 void clt_newton_turn(const clt_far *far, clt_live_item *item) {
-  const size_t at = TERMS * item->leaf * far->rank, rank = far->rank;
+  const clt_hierarchy_storage *of = far->hierarchy;
   const int channel = item->channel;
-  far->kernels->dot_rows(left_of(far, channel) + at, rank, far->coupled[channel],
-                         of_channel(far->right, 2 * rank, channel), item->turn);
+  clt_leaf_rows_dot(&of->left, channel, item->leaf, of_channel(far->turned, far->rank, channel),
+                    of->core != NULL ? far->rank : coupled_steps(far, channel), item->turn);
   if (far->pulled[channel]) {
-    far->kernels->dot_rows(right_of(far, channel) + at, rank, rank, of_channel(far->q, rank, channel), item->pull);
+    clt_leaf_rows_dot(&of->right, channel, item->leaf, of_channel(far->q, far->rank, channel), far->rank, item->pull);
   } else {
     memset(item->pull, 0, sizeof item->pull);
   }
 }
 
 void clt_newton_gather(clt_far *far) {
-  sum_items(far, far->hierarchy->right, offsetof(clt_live_item, given));
+  sum_items(far, &far->hierarchy->right, offsetof(clt_live_item, given));
 #pragma omp for schedule(dynamic, 1)
   for (int channel = 0; channel < far->channels; channel++) {
+    float *folded = of_channel(far->folded, far->rank, channel);
     double light = 0;
     for (size_t k = 0; k < leaves_of(far); k++) {
       light += items_of(far, channel)[k].light;
     }
     far->mean[channel] = (float)(light / (double)far->cells);
-    fold_chunks(far, channel, 0, far->rank, of_channel(far->z, far->rank, channel));
+    fold_chunks(far, channel, 0, far->rank, folded);
+    clt_hierarchic_core(far->hierarchy, channel, false, folded, of_channel(far->z, far->rank, channel));
   }
 }
 
 void clt_newton_light(const clt_far *far, clt_live_item *item) {
-  far->kernels->dot_rows(left_of(far, item->channel) + TERMS * item->leaf * far->rank, far->rank, far->rank,
-                         of_channel(far->z, far->rank, item->channel), item->far);
+  clt_leaf_rows_dot(&far->hierarchy->left, item->channel, item->leaf, of_channel(far->z, far->rank, item->channel),
+                    far->rank, item->far);
 }
 
 /* ||D^-1 V (U'r - q)||^2, of one channel. */
@@ -171,7 +186,7 @@ static double drift_of(clt_far *far, int channel) {
   const float *gram = of_channel(far->gram, rank * rank, channel), *q = of_channel(far->q, rank, channel);
   float *apart = of_channel(far->right, 2 * rank, channel);
   double sum = 0;
-  fold_chunks(far, channel, 0, rank, apart);
+  fold_taken(far, channel, 0, apart);
   for (size_t r = 0; r < rank; r++) {
     apart[r] -= q[r];
   }
@@ -186,7 +201,7 @@ static double drift_of(clt_far *far, int channel) {
 }
 
 void clt_newton_drift(clt_far *far, double drift[CLT_CHANNELS_MAX]) {
-  sum_items(far, far->hierarchy->left, offsetof(clt_live_item, whole));
+  sum_items(far, &far->hierarchy->left, offsetof(clt_live_item, whole));
 #pragma omp for schedule(dynamic, 1)
   for (int channel = 0; channel < far->channels; channel++) {
     drift[channel] = drift_of(far, channel);

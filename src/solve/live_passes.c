@@ -38,13 +38,16 @@ bool clt_live_time_passes(clt_live *live, const float *target, clt_live_pass pas
   const double shown = (double)far->strips * CLT_LIVE_LANES * sizeof(float);
   const double scale = far->scale != NULL ? (double)far->strips * CLT_LIVE_LANES * sizeof *far->scale : 0;
   const double constant = (double)far->strips * sizeof *far->strip + scale;
-  const double factor = channels * CLT_LEAF_TERMS * (double)far->hierarchy->leaves * (double)far->rank * sizeof(float);
   const double spill = (double)far->blocks * CLT_LIVE_LANES * sizeof *far->spill + (double)far->codes;
+  const clt_hierarchy_storage *of = far->hierarchy;
+  const double times = channels / (double)of->left.sets, core = of->core != NULL ? (double)(far->rank * far->rank) : 0;
+  const double give = times * (double)clt_leaf_rows_bytes(&of->right) + channels * core * sizeof(float);
+  const double take = times * (double)clt_leaf_rows_bytes(&of->left);
   far->target = target;
   pass[CLT_LIVE_PASS_AIM] = (clt_live_pass){"frame: aim", constant + shown + 2 * plane, 0};
   pass[CLT_LIVE_PASS_MOVE] = (clt_live_pass){"frame: move", constant + shown + 3 * plane, 0};
-  pass[CLT_LIVE_PASS_GATHER] = (clt_live_pass){"frame: gather", factor, 0};
-  pass[CLT_LIVE_PASS_LIGHT] = (clt_live_pass){"frame: light", factor, 0};
+  pass[CLT_LIVE_PASS_GATHER] = (clt_live_pass){"frame: gather", give, 0};
+  pass[CLT_LIVE_PASS_LIGHT] = (clt_live_pass){"frame: light", take, 0};
   pass[CLT_LIVE_PASS_LOOK] = (clt_live_pass){"frame: look", constant + shown + 2 * plane + spill, 0};
   for (clt_live_pass_name name = CLT_LIVE_PASS_AIM; name < CLT_LIVE_PASSES; name++) {
     pass[name].seconds =

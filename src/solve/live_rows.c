@@ -226,47 +226,6 @@ INLINE void weigh(const clt_far *far, clt_live_item *item) {
   }
 }
 
-INLINE void add_rows(const float *row, size_t stride, size_t count, const float term[CLT_LEAF_TERMS], float *out) {
-  const float *second = row + stride, *third = second + stride, *fourth = third + stride;
-  size_t k = 0;
-  for (; k + LANES <= count; k += LANES) {
-    lanes a, b, c, d, sum;
-    take(&a, row + k);
-    take(&b, second + k);
-    take(&c, third + k);
-    take(&d, fourth + k);
-    take(&sum, out + k);
-    sum += (term[0] * a + term[1] * b) + (term[2] * c + term[3] * d);
-    memcpy(out + k, &sum, sizeof sum);
-  }
-  for (; k < count; k++) {
-    out[k] += (term[0] * row[k] + term[1] * second[k]) + (term[2] * third[k] + term[3] * fourth[k]);
-  }
-}
-
-INLINE void dot_rows(const float *row, size_t stride, size_t count, const float *in, float term[CLT_LEAF_TERMS]) {
-  lanes sums[CLT_LEAF_TERMS] = {0};
-  size_t k = 0;
-  for (; k + LANES <= count; k += LANES) {
-    lanes value, times;
-    take(&times, in + k);
-    for (size_t t = 0; t < CLT_LEAF_TERMS; t++) {
-      take(&value, row + t * stride + k);
-      sums[t] += value * times;
-    }
-  }
-  for (size_t t = 0; t < CLT_LEAF_TERMS; t++) {
-    float sum = 0;
-    for (int l = 0; l < LANES; l++) {
-      sum += sums[t][l];
-    }
-    for (size_t rest = k; rest < count; rest++) {
-      sum += row[t * stride + rest] * in[rest];
-    }
-    term[t] = sum;
-  }
-}
-
 /* Every pass once for each kind of processor. */
 #define VARIANT(name, attributes)                                                                                      \
   attributes static void aim_##name(const clt_far *far, clt_live_item *item) {                                         \
@@ -281,22 +240,12 @@ INLINE void dot_rows(const float *row, size_t stride, size_t count, const float 
   attributes static void weigh_##name(const clt_far *far, clt_live_item *item) {                                       \
     weigh(far, item);                                                                                                  \
   }                                                                                                                    \
-  attributes static void add_rows_##name(const float *row, size_t stride, size_t count,                                \
-                                         const float term[CLT_LEAF_TERMS], float *out) {                               \
-    add_rows(row, stride, count, term, out);                                                                           \
-  }                                                                                                                    \
-  attributes static void dot_rows_##name(const float *row, size_t stride, size_t count, const float *in,               \
-                                         float term[CLT_LEAF_TERMS]) {                                                 \
-    dot_rows(row, stride, count, in, term);                                                                            \
-  }                                                                                                                    \
   static const clt_live_kernels name = {.needs = NEEDS_##name,                                                         \
                                         .runs_here = has_##name,                                                       \
                                         .aim = aim_##name,                                                             \
                                         .look = look_##name,                                                           \
                                         .move = move_##name,                                                           \
-                                        .weigh = weigh_##name,                                                         \
-                                        .add_rows = add_rows_##name,                                                   \
-                                        .dot_rows = dot_rows_##name};
+                                        .weigh = weigh_##name};
 
 static bool has_portable(void) {
   return true;

@@ -34,11 +34,39 @@ static double dot_portable(const int8_t *code, const float *scale, const float *
   return fold(lane) + dot_rest(code, scale, x, k, count);
 }
 
+/* Eight partial sums of each row, and the columns behind the last whole eight. */
+static void fold_rows(float lane[4][8], const int8_t *const code[4], const float *const scale[4], const float *x,
+                      size_t done, size_t count, float sum[4]) {
+  for (int r = 0; r < 4; r++) {
+    const float *of = lane[r];
+    sum[r] = ((of[0] + of[4]) + (of[2] + of[6])) + ((of[1] + of[5]) + (of[3] + of[7]));
+    for (size_t k = done; k < count; k++) {
+      sum[r] += scale[r][k / CLT_BLOCK] * ((float)code[r][k] * x[k]);
+    }
+  }
+}
+
+static void dots_portable(const int8_t *const code[4], const float *const scale[4], const float *x, size_t count,
+                          float sum[4]) {
+  float lane[4][8] = {{0}};
+  size_t k = 0;
+  for (; k + 8 <= count; k += 8) {
+    for (int r = 0; r < 4; r++) {
+      const float block = scale[r][k / CLT_BLOCK];
+      for (size_t l = 0; l < 8; l++) {
+        lane[r][l] += block * ((float)code[r][k + l] * x[k + l]);
+      }
+    }
+  }
+  fold_rows(lane, code, scale, x, k, count, sum);
+}
+
 static void add_from(const int8_t *const code[4], const float *const scale[4], const float y[4], size_t done,
                      size_t count, float *x) {
   const int8_t *a = code[0], *b = code[1], *c = code[2], *d = code[3];
-  for (size_t first = done; first < count; first += CLT_BLOCK) {
-    const size_t block = first / CLT_BLOCK, end = first + CLT_BLOCK < count ? first + CLT_BLOCK : count;
+  for (size_t first = done, end; first < count; first = end) {
+    const size_t block = first / CLT_BLOCK;
+    end = (block + 1) * CLT_BLOCK < count ? (block + 1) * CLT_BLOCK : count;
     const float sa = y[0] * scale[0][block], sb = y[1] * scale[1][block];
     const float sc = y[2] * scale[2][block], sd = y[3] * scale[3][block];
     for (size_t k = first; k < end; k++) {
@@ -56,7 +84,8 @@ static bool runs_everywhere(void) {
   return true;
 }
 
-static const clt_byte_kernels portable = {.runs_here = runs_everywhere, .dot = dot_portable, .add = add_portable};
+static const clt_byte_kernels portable = {
+    .runs_here = runs_everywhere, .dot = dot_portable, .dots = dots_portable, .add = add_portable};
 
 #if defined(__x86_64__)
 #include <immintrin.h>
@@ -90,14 +119,38 @@ AVX2 static double dot_avx2(const int8_t *code, const float *scale, const float 
   return fold(lane) + dot_rest(code, scale, x, k, count);
 }
 
+AVX2 static inline __m256 scaled(const int8_t *code, const float *scale, __m256 x) {
+  return _mm256_mul_ps(_mm256_set1_ps(*scale), _mm256_mul_ps(take_bytes(code), x));
+}
+
+AVX2 static void dots_avx2(const int8_t *const code[4], const float *const scale[4], const float *x, size_t count,
+                           float sum[4]) {
+  __m256 a = _mm256_setzero_ps(), b = a, c = a, d = a;
+  size_t k = 0;
+  for (; k + 8 <= count; k += 8) {
+    const __m256 times = _mm256_loadu_ps(x + k);
+    const size_t block = k / CLT_BLOCK;
+    a = _mm256_add_ps(a, scaled(code[0] + k, scale[0] + block, times));
+    b = _mm256_add_ps(b, scaled(code[1] + k, scale[1] + block, times));
+    c = _mm256_add_ps(c, scaled(code[2] + k, scale[2] + block, times));
+    d = _mm256_add_ps(d, scaled(code[3] + k, scale[3] + block, times));
+  }
+  float lane[4][8];
+  _mm256_storeu_ps(lane[0], a);
+  _mm256_storeu_ps(lane[1], b);
+  _mm256_storeu_ps(lane[2], c);
+  _mm256_storeu_ps(lane[3], d);
+  fold_rows(lane, code, scale, x, k, count, sum);
+}
+
 AVX2 static void add_avx2(const int8_t *const code[4], const float *const scale[4], const float y[4], size_t count,
                           float *x) {
-  size_t first = 0;
-  for (; first + CLT_BLOCK <= count; first += CLT_BLOCK) {
-    const size_t block = first / CLT_BLOCK;
+  size_t k = 0;
+  while (k + 8 <= count) {
+    const size_t block = k / CLT_BLOCK, end = (block + 1) * CLT_BLOCK < count ? (block + 1) * CLT_BLOCK : count;
     const __m256 sa = _mm256_set1_ps(y[0] * scale[0][block]), sb = _mm256_set1_ps(y[1] * scale[1][block]);
     const __m256 sc = _mm256_set1_ps(y[2] * scale[2][block]), sd = _mm256_set1_ps(y[3] * scale[3][block]);
-    for (size_t k = first; k < first + CLT_BLOCK; k += 8) {
+    for (; k + 8 <= end; k += 8) {
       __m256 front =
           _mm256_add_ps(_mm256_mul_ps(sa, take_bytes(code[0] + k)), _mm256_mul_ps(sb, take_bytes(code[1] + k)));
       __m256 back =
@@ -105,10 +158,11 @@ AVX2 static void add_avx2(const int8_t *const code[4], const float *const scale[
       _mm256_storeu_ps(x + k, _mm256_add_ps(_mm256_loadu_ps(x + k), _mm256_add_ps(front, back)));
     }
   }
-  add_from(code, scale, y, first, count, x);
+  add_from(code, scale, y, k, count, x);
 }
 
-static const clt_byte_kernels avx2 = {.needs = "AVX2", .runs_here = has_avx2, .dot = dot_avx2, .add = add_avx2};
+static const clt_byte_kernels avx2 = {
+    .needs = "AVX2", .runs_here = has_avx2, .dot = dot_avx2, .dots = dots_avx2, .add = add_avx2};
 
 const clt_byte_kernels *const clt_byte_variants[] = {&avx2, &portable, NULL};
 #else

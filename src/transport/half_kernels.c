@@ -65,6 +65,31 @@ static double dot_portable(const uint16_t *code, const float *x, size_t count) {
   return fold(lane) + dot_rest(code, x, k, count);
 }
 
+/* Eight partial sums of each row, and the columns behind the last whole eight. */
+static void fold_rows(float lane[4][8], const uint16_t *const code[4], const float *x, size_t done, size_t count,
+                      float sum[4]) {
+  for (int r = 0; r < 4; r++) {
+    const float *of = lane[r];
+    sum[r] = ((of[0] + of[4]) + (of[2] + of[6])) + ((of[1] + of[5]) + (of[3] + of[7]));
+    for (size_t k = done; k < count; k++) {
+      sum[r] += half_value(code[r][k]) * x[k];
+    }
+  }
+}
+
+static void dots_portable(const uint16_t *const code[4], const float *x, size_t count, float sum[4]) {
+  float lane[4][8] = {{0}};
+  size_t k = 0;
+  for (; k + 8 <= count; k += 8) {
+    for (int r = 0; r < 4; r++) {
+      for (size_t l = 0; l < 8; l++) {
+        lane[r][l] += half_value(code[r][k + l]) * x[k + l];
+      }
+    }
+  }
+  fold_rows(lane, code, x, k, count, sum);
+}
+
 static void add_from(const uint16_t *const code[4], const float y[4], size_t done, size_t count, float *x) {
   const uint16_t *a = code[0], *b = code[1], *c = code[2], *d = code[3];
   for (size_t k = done; k < count; k++) {
@@ -80,7 +105,8 @@ static bool runs_everywhere(void) {
   return true;
 }
 
-static const clt_half_kernels portable = {.runs_here = runs_everywhere, .dot = dot_portable, .add = add_portable};
+static const clt_half_kernels portable = {
+    .runs_here = runs_everywhere, .dot = dot_portable, .dots = dots_portable, .add = add_portable};
 
 #if defined(__x86_64__)
 #include <cpuid.h>
@@ -115,6 +141,24 @@ F16C static double dot_f16c(const uint16_t *code, const float *x, size_t count) 
   return fold(lane) + dot_rest(code, x, k, count);
 }
 
+F16C static void dots_f16c(const uint16_t *const code[4], const float *x, size_t count, float sum[4]) {
+  __m256 a = _mm256_setzero_ps(), b = a, c = a, d = a;
+  size_t k = 0;
+  for (; k + 8 <= count; k += 8) {
+    const __m256 times = _mm256_loadu_ps(x + k);
+    a = _mm256_add_ps(a, _mm256_mul_ps(take_half(code[0] + k), times));
+    b = _mm256_add_ps(b, _mm256_mul_ps(take_half(code[1] + k), times));
+    c = _mm256_add_ps(c, _mm256_mul_ps(take_half(code[2] + k), times));
+    d = _mm256_add_ps(d, _mm256_mul_ps(take_half(code[3] + k), times));
+  }
+  float lane[4][8];
+  _mm256_storeu_ps(lane[0], a);
+  _mm256_storeu_ps(lane[1], b);
+  _mm256_storeu_ps(lane[2], c);
+  _mm256_storeu_ps(lane[3], d);
+  fold_rows(lane, code, x, k, count, sum);
+}
+
 F16C static void add_f16c(const uint16_t *const code[4], const float y[4], size_t count, float *x) {
   const __m256 ya = _mm256_set1_ps(y[0]), yb = _mm256_set1_ps(y[1]);
   const __m256 yc = _mm256_set1_ps(y[2]), yd = _mm256_set1_ps(y[3]);
@@ -128,7 +172,7 @@ F16C static void add_f16c(const uint16_t *const code[4], const float y[4], size_
 }
 
 static const clt_half_kernels f16c = {
-    .needs = "AVX2 and F16C", .runs_here = has_f16c, .dot = dot_f16c, .add = add_f16c};
+    .needs = "AVX2 and F16C", .runs_here = has_f16c, .dot = dot_f16c, .dots = dots_f16c, .add = add_f16c};
 
 const clt_half_kernels *const clt_half_variants[] = {&f16c, &portable, NULL};
 #else

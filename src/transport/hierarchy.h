@@ -4,22 +4,23 @@
  * noise lets one tell. Over a leaf with the coordinates -1 < u, v < 1 stand the four functions 1, u, v, u v; P (N x 4L)
  * holds them for all L leaves. With a rank R of far light that a few blocks determine,
  *
- *   T = diag(own) + near + diag(scale) P left right' P' diag(gather) + flood 1' / N,
+ *   T = diag(own) + near + diag(scale) P left core right' P' diag(gather) + flood 1' / N,
  *
- * left and right 4L x R. `flood` is what makes every row's sum that of the transport it was made from. Of light that is
- * known by whole blocks (transport/blocks.h), with v = gather, c the columns over scale, d_b the sum of v over block b,
- *   left  = [P^+ c, indicators],   right = [indicators / d, (P^+ c less its mean over blocks) / d]. */
+ * left and right 4L x R. Where light comes back from the same walls in every colour, the channels share left and right
+ * and differ in core (R x R) alone; else core is 1 and each has its own (hierarchy_share.c). `flood` is what makes
+ * every row's sum that of the transport it was made from. Of light that is known by whole blocks (transport/blocks.h),
+ * with v = gather, c the columns over scale, d_b the sum of v over block b, left  = [P^+ c, indicators],   right =
+ * [indicators / d, (P^+ c less its mean over blocks) / d]. */
 #ifndef CLT_TRANSPORT_HIERARCHY_H
 #define CLT_TRANSPORT_HIERARCHY_H
 
 #include <pthread.h>
 
-#include "transport/kernels.h"
 #include "transport/kind.h"
+#include "transport/leaf_rows.h"
 #include "transport/near_stream.h"
 
 enum {
-  CLT_LEAF_TERMS = 4,
   CLT_LEAF_SIDE_MAX = 32,
   CLT_HIERARCHY_CHUNKS = 16 /* of leaves, so that sums do not depend on the number of threads */
 };
@@ -41,7 +42,8 @@ typedef struct clt_leaf_spans {
 typedef struct clt_hierarchy_storage {
   size_t leaves, rank; /* L, R */
   clt_leaf *leaf;
-  float *left, *right;                 /* channels x 4L x R */
+  clt_leaf_rows left, right;           /* 4L x R */
+  float *core;                         /* channels x R x R where the channels share left and right; else NULL */
   float *scale, *gather, *own, *flood; /* channels x N */
   int64_t *start;                      /* N + 1: near by compressed rows, without the diagonal; one pattern for all */
   int32_t *cell;
@@ -64,6 +66,9 @@ size_t clt_hierarchic_scratch(const clt_hierarchy_storage *own);
 clt_status clt_leaf_spans_make(const clt_leaf *leaf, size_t leaves, int width, int height, clt_leaf_spans *spans,
                                clt_error *error);
 void clt_leaf_spans_finish(clt_leaf_spans *spans);
+
+/* out = core in, or core' in; a copy where there is no core. `in` and `out` hold R and do not overlap. */
+void clt_hierarchic_core(const clt_hierarchy_storage *own, int channel, bool transposed, const float *in, float *out);
 
 /* Storage without arrays, into transport->storage. */
 clt_status clt_hierarchic_begin(clt_transport *transport, size_t leaves, size_t rank, const char *source,

@@ -87,8 +87,8 @@ static void factor_column(build *job, size_t channel, size_t b, double *fit, dou
   for (size_t m = 0; m < CLT_LEAF_TERMS * own->leaves; m++) {
     const int32_t at = block_of(job, &own->leaf[m / CLT_LEAF_TERMS]);
     const bool even = m % CLT_LEAF_TERMS == 0;
-    float *left = own->left + (channel * CLT_LEAF_TERMS * own->leaves + m) * own->rank;
-    float *right = own->right + (channel * CLT_LEAF_TERMS * own->leaves + m) * own->rank;
+    float *left = own->left.value + (channel * CLT_LEAF_TERMS * own->leaves + m) * own->rank;
+    float *right = own->right.value + (channel * CLT_LEAF_TERMS * own->leaves + m) * own->rank;
     left[b] = (float)fit[m];
     right[count + b] = (float)(blocks->inverse[b] * (fit[m] - (even ? mean[at] : 0)));
     if (even && at == (int32_t)b) {

@@ -3,7 +3,7 @@
 
 #include "base/memory.h"
 #include "transport/check.h"
-#include "transport/hierarchy.h"
+#include "transport/hierarchy_factors.h"
 
 static clt_values values_of(const clt_transport *transport, const char *source, const char *name, size_t count,
                             const float *data) {
@@ -13,15 +13,13 @@ static clt_values values_of(const clt_transport *transport, const char *source, 
 
 clt_status clt_hierarchic_check(const clt_transport *transport, const char *source, clt_error *error) {
   const clt_hierarchy_storage *own = transport->storage;
-  const size_t cells = transport->cols, factor = CLT_LEAF_TERMS * own->leaves * own->rank;
-  const clt_values all[] = {values_of(transport, source, "/hierarchy/left", factor, own->left),
-                            values_of(transport, source, "/hierarchy/right", factor, own->right),
-                            values_of(transport, source, "/hierarchy/scale", cells, own->scale),
+  const size_t cells = transport->cols;
+  const clt_values all[] = {values_of(transport, source, "/hierarchy/scale", cells, own->scale),
                             values_of(transport, source, "/hierarchy/gather", cells, own->gather),
                             values_of(transport, source, "/hierarchy/own", cells, own->own),
                             values_of(transport, source, "/hierarchy/flood", cells, own->flood),
                             values_of(transport, source, "/hierarchy/value", (size_t)own->start[cells], own->value)};
-  clt_status status = CLT_OK;
+  clt_status status = clt_hierarchic_check_factors(transport, source, error);
   for (size_t k = 0; k < sizeof all / sizeof all[0] && status == CLT_OK; k++) {
     status = clt_check_finite(&all[k], error);
   }
@@ -108,8 +106,9 @@ void clt_hierarchic_destroy(clt_transport *transport) {
     pthread_mutex_destroy(&own->turn[channel]);
   }
   free(own->leaf);
-  free(own->left);
-  free(own->right);
+  clt_leaf_rows_finish(&own->left);
+  clt_leaf_rows_finish(&own->right);
+  free(own->core);
   free(own->scale);
   free(own->gather);
   free(own->own);
@@ -123,15 +122,12 @@ void clt_hierarchic_destroy(clt_transport *transport) {
   free(own);
 }
 
-/* The parts of the group; sizes are what the storage says. */
-enum { LEAF, LEFT, RIGHT, SCALE, GATHER, OWN, FLOOD, START, CELL, VALUE, ERROR, PARTS };
+/* The parts of the group but the factors; sizes are what the storage says. */
+enum { LEAF, SCALE, GATHER, OWN, FLOOD, START, CELL, VALUE, ERROR, PARTS };
 static void list_parts(const clt_transport *transport, size_t entries, clt_hdf_array parts[PARTS]) {
   clt_hierarchy_storage *own = transport->storage;
   const size_t cells = transport->cols, channels = (size_t)transport->channels;
-  const size_t nodes = CLT_LEAF_TERMS * own->leaves;
   parts[LEAF] = (clt_hdf_array){"/hierarchy/leaf", H5T_NATIVE_INT32, 2, {own->leaves, 4}, own->leaf};
-  parts[LEFT] = (clt_hdf_array){"/hierarchy/left", H5T_NATIVE_FLOAT, 3, {channels, nodes, own->rank}, own->left};
-  parts[RIGHT] = (clt_hdf_array){"/hierarchy/right", H5T_NATIVE_FLOAT, 3, {channels, nodes, own->rank}, own->right};
   parts[SCALE] = (clt_hdf_array){"/hierarchy/scale", H5T_NATIVE_FLOAT, 2, {channels, cells}, own->scale};
   parts[GATHER] = (clt_hdf_array){"/hierarchy/gather", H5T_NATIVE_FLOAT, 2, {channels, cells}, own->gather};
   parts[OWN] = (clt_hdf_array){"/hierarchy/own", H5T_NATIVE_FLOAT, 2, {channels, cells}, own->own};
@@ -156,20 +152,17 @@ static clt_status read_error(clt_transport *transport, const clt_hdf *hdf, clt_e
   return status;
 }
 
-/* Leaves and rank come with the first two parts; the sizes of the others follow from them. */
+/* The number of leaves comes with the first part. */
 static clt_status read_parts(clt_transport *transport, const clt_hdf *hdf, size_t *entries, clt_error *error) {
   clt_hierarchy_storage *own = transport->storage;
-  void **const homes[ERROR] = {(void **)&own->leaf,   (void **)&own->left, (void **)&own->right, (void **)&own->scale,
-                               (void **)&own->gather, (void **)&own->own,  (void **)&own->flood, (void **)&own->start,
-                               (void **)&own->cell,   (void **)&own->value};
+  void **const homes[ERROR] = {(void **)&own->leaf,  (void **)&own->scale, (void **)&own->gather, (void **)&own->own,
+                               (void **)&own->flood, (void **)&own->start, (void **)&own->cell,   (void **)&own->value};
   *entries = CLT_HDF_ANY;
   for (int part = 0; part < ERROR; part++) {
     clt_hdf_array parts[PARTS];
     list_parts(transport, *entries, parts);
     if (part == LEAF) {
       parts[LEAF].shape[0] = CLT_HDF_ANY;
-    } else if (part == LEFT) {
-      parts[LEFT].shape[2] = CLT_HDF_ANY;
     }
     clt_status status = clt_hdf_read(hdf, &parts[part], error);
     *homes[part] = parts[part].data;
@@ -177,10 +170,10 @@ static clt_status read_parts(clt_transport *transport, const clt_hdf *hdf, size_
       return status;
     }
     own->leaves = part == LEAF ? parts[LEAF].shape[0] : own->leaves;
-    own->rank = part == LEFT ? parts[LEFT].shape[2] : own->rank;
     *entries = part == CELL ? parts[CELL].shape[0] : *entries;
   }
-  return read_error(transport, hdf, error);
+  const clt_status status = clt_hierarchic_load_factors(transport, hdf, error);
+  return status == CLT_OK ? read_error(transport, hdf, error) : status;
 }
 
 clt_status clt_hierarchic_load(clt_transport *transport, const clt_hdf *hdf, clt_error *error) {
@@ -200,5 +193,5 @@ clt_status clt_hierarchic_save(const clt_transport *transport, const clt_hdf *hd
   for (int part = 0; part < PARTS && status == CLT_OK; part++) {
     status = clt_hdf_write(hdf, &parts[part], error);
   }
-  return status;
+  return status == CLT_OK ? clt_hierarchic_save_factors(transport, hdf, error) : status;
 }

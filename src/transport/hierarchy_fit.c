@@ -359,35 +359,52 @@ static clt_status choose_near(fit *f, double share, clt_error *error) {
   return status;
 }
 
+static void widen(const float *from, size_t count, double *to) {
+  for (size_t k = 0; k < count; k++) {
+    to[k] = (double)from[k];
+  }
+}
+
+/* M of a channel as products will have it, left core right'. room holds 3 x 4L x R and R x R. */
+static void read_core(fit *f, size_t channel, double *room) {
+  const clt_hierarchy_storage *own = f->own;
+  const size_t rank = own->rank, factor = f->nodes * rank, first = own->core == NULL ? channel * factor : 0;
+  const blasint nodes = (blasint)f->nodes, inner = (blasint)rank;
+  double *left = room, *right = room + factor, *turned = room + 2 * factor, *core = room + 3 * factor;
+  widen(own->left.value + first, factor, left);
+  widen(own->right.value + first, factor, right);
+  if (own->core != NULL) {
+    widen(own->core + channel * rank * rank, rank * rank, core);
+    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, nodes, inner, inner, 1, left, inner, core, inner, 0, turned,
+                inner);
+    left = turned;
+  }
+  cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, nodes, nodes, inner, 1, left, inner, right, inner, 0,
+              f->core + channel * f->nodes * f->nodes, nodes);
+}
+
 /* M into factors of least rank, and back as products will have it. */
 static clt_status compress(fit *f, clt_error *error) {
   clt_hierarchy_storage *own = f->own;
   const size_t whole = f->nodes * f->nodes;
   double left_out[CLT_CHANNELS_MAX];
   for (size_t k = 0; k < f->channels * whole; k++) {
-    own->left[k] = (float)f->core[k];
-    own->right[k] = k % whole / f->nodes == k % f->nodes ? 1 : 0;
+    own->left.value[k] = (float)f->core[k];
+    own->right.value[k] = k % whole / f->nodes == k % f->nodes ? 1 : 0;
   }
   for (size_t c = 0; c < f->channels; c++) {
     left_out[c] = RANK_SHARE * f->tolerance * f->light[c];
   }
   const clt_status status = clt_leaves_compress(own, f->channels, left_out, error);
-  const size_t factor = f->nodes * own->rank;
-  double *left = clt_alloc(2 * factor, sizeof *left), *right = left + factor;
-  if (status != CLT_OK || left == NULL) {
-    free(left);
+  double *room = clt_alloc(3 * f->nodes * own->rank + own->rank * own->rank, sizeof *room);
+  if (status != CLT_OK || room == NULL) {
+    free(room);
     return status != CLT_OK ? status : clt_fail(error, CLT_FAILED, "no memory for far light of rank %zu", own->rank);
   }
   for (size_t c = 0; c < f->channels; c++) {
-    for (size_t k = 0; k < factor; k++) {
-      left[k] = (double)own->left[c * factor + k];
-      right[k] = (double)own->right[c * factor + k];
-    }
-    const blasint nodes = (blasint)f->nodes, rank = (blasint)own->rank;
-    cblas_dgemm(CblasRowMajor, CblasNoTrans, CblasTrans, nodes, nodes, rank, 1, left, rank, right, rank, 0,
-                f->core + c * whole, nodes);
+    read_core(f, c, room);
   }
-  free(left);
+  free(room);
   return CLT_OK;
 }
 

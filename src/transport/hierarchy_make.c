@@ -10,16 +10,15 @@
 clt_status clt_hierarchic_reserve_cells(clt_transport *transport, clt_error *error) {
   clt_hierarchy_storage *own = transport->storage;
   const size_t channels = (size_t)transport->channels, cells = transport->cols;
-  const size_t factor = channels * CLT_LEAF_TERMS * own->leaves;
-  own->left = clt_alloc(factor, own->rank * sizeof *own->left);
-  own->right = clt_alloc(factor, own->rank * sizeof *own->right);
+  const bool left = clt_leaf_rows_reserve(&own->left, 32, channels, own->leaves, own->rank);
+  const bool right = clt_leaf_rows_reserve(&own->right, 32, channels, own->leaves, own->rank);
   own->scale = clt_alloc(channels * cells, sizeof *own->scale);
   own->gather = clt_alloc(channels * cells, sizeof *own->gather);
   own->own = clt_alloc(channels * cells, sizeof *own->own);
   own->flood = clt_alloc(channels * cells, sizeof *own->flood);
   own->start = clt_alloc(cells + 1, sizeof *own->start);
-  const bool all = own->left != NULL && own->right != NULL && own->scale != NULL && own->gather != NULL &&
-                   own->own != NULL && own->flood != NULL && own->start != NULL;
+  const bool all = left && right && own->scale != NULL && own->gather != NULL && own->own != NULL &&
+                   own->flood != NULL && own->start != NULL;
   return all ? CLT_OK : clt_fail(error, CLT_FAILED, "no memory for a hierarchy over %zu cells", cells);
 }
 
@@ -51,43 +50,99 @@ static clt_status match_floods(const clt_transport *from, clt_transport *to, clt
     clt_transport_row_sums(from, c, sums);
     clt_transport_row_sums(to, c, sums + cells);
     for (size_t i = 0; i < cells; i++) {
-      own->flood[(size_t)c * cells + i] = (float)(sums[i] - sums[cells + i]);
+      own->flood[(size_t)c * cells + i] += (float)(sums[i] - sums[cells + i]);
     }
   }
   free(sums);
   return CLT_OK;
 }
 
-/* ||(T' - T) x|| / ||T x|| of one drive over all channels; x, y and z hold a channel. */
-static double product_error(const clt_transport *from, const clt_transport *to, const double *x, double *y, double *z) {
-  double apart = 0, whole = 0;
-  for (int c = 0; c < from->channels; c++) {
-    clt_transport_apply(from, c, x, y);
-    clt_transport_apply(to, c, x, z);
-    for (size_t i = 0; i < from->cols; i++) {
-      apart += (z[i] - y[i]) * (z[i] - y[i]);
-      whole += y[i] * y[i];
-    }
+/* Drives that light bands of 3, 9, 27... cells, across and down. */
+enum { BAND_LEAST = 3, BAND_STEP = 3 };
+static void light_bands(const clt_transport *of, size_t band, double *x) {
+  const size_t width = (size_t)of->width;
+  for (size_t j = 0; j < of->cols; j++) {
+    x[j] = (j % width / band + j / width / band) % 2 == 0 ? 1 : 0;
   }
-  return whole > 0 ? sqrt(apart / whole) : 0;
 }
 
-/* The worst of drives that light bands of 3, 9, 27... cells, across and down. */
-static clt_status measure_error(const clt_transport *from, clt_transport *to, clt_error *error) {
-  const size_t cells = from->cols, width = (size_t)from->width;
-  clt_hierarchy_storage *own = to->storage;
-  double *x = clt_alloc(cells, 3 * sizeof *x);
-  if (x == NULL) {
-    return clt_fail(error, CLT_FAILED, "no memory to compare products of %zu cells", cells);
-  }
-  for (size_t band = 3; band <= 2 * width; band *= 3) {
-    for (size_t j = 0; j < cells; j++) {
-      x[j] = (j % width / band + j / width / band) % 2 == 0 ? 1 : 0;
+/* Products of a channel by what is to be compared. */
+typedef void product(const void *of, int channel, const double *x, double *y);
+
+/* ||a x - b x|| / ||a x|| over all channels, the worst of those drives; room holds 3 N. */
+static double product_error(const clt_transport *like, product *multiply, const void *a, const void *b, double *room) {
+  const size_t cells = like->cols;
+  double *x = room, *y = room + cells, *z = room + 2 * cells, worst = 0;
+  for (size_t band = BAND_LEAST; band <= 2 * (size_t)like->width; band *= BAND_STEP) {
+    double apart = 0, whole = 0;
+    light_bands(like, band, x);
+    for (int c = 0; c < like->channels; c++) {
+      multiply(a, c, x, y);
+      multiply(b, c, x, z);
+      for (size_t i = 0; i < cells; i++) {
+        apart += (z[i] - y[i]) * (z[i] - y[i]);
+        whole += y[i] * y[i];
+      }
     }
-    own->error = fmax(own->error, product_error(from, to, x, x + cells, x + 2 * cells));
+    worst = fmax(worst, whole > 0 ? sqrt(apart / whole) : 0);
   }
-  free(x);
+  return worst;
+}
+
+static void multiply_transport(const void *of, int channel, const double *x, double *y) {
+  clt_transport_apply(of, channel, x, y);
+}
+
+static clt_status measure_error(const clt_transport *from, clt_transport *to, clt_error *error) {
+  clt_hierarchy_storage *own = to->storage;
+  double *room = clt_alloc(from->cols, 3 * sizeof *room);
+  if (room == NULL) {
+    return clt_fail(error, CLT_FAILED, "no memory to compare products of %zu cells", from->cols);
+  }
+  own->error = product_error(from, multiply_transport, from, to, room);
+  free(room);
   return CLT_OK;
+}
+
+/* Factors that a hierarchy is to have for a product. */
+typedef struct factors {
+  clt_transport *transport;
+  clt_leaf_rows left, right;
+} factors;
+
+static void multiply_factors(const void *of, int channel, const double *x, double *y) {
+  const factors *with = of;
+  clt_hierarchy_storage *own = with->transport->storage;
+  const clt_leaf_rows left = own->left, right = own->right;
+  own->left = with->left;
+  own->right = with->right;
+  clt_transport_apply(with->transport, channel, x, y);
+  own->left = left;
+  own->right = right;
+}
+
+/* The factors in the fewest bits that change products by no more than `most`. */
+static clt_status pack(clt_transport *to, double most, clt_error *error) {
+  static const int BITS[] = {8, 16};
+  clt_hierarchy_storage *own = to->storage;
+  const factors plain = {to, own->left, own->right};
+  double *room = clt_alloc(to->cols, 3 * sizeof *room);
+  bool packed = false, memory = room != NULL;
+  for (size_t k = 0; k < sizeof BITS / sizeof BITS[0] && !packed && memory; k++) {
+    factors coded = {.transport = to};
+    memory =
+        clt_leaf_rows_pack(&own->left, BITS[k], &coded.left) && clt_leaf_rows_pack(&own->right, BITS[k], &coded.right);
+    packed = memory && product_error(to, multiply_factors, &plain, &coded, room) <= most;
+    if (packed) {
+      own->left = coded.left;
+      own->right = coded.right;
+      coded = plain;
+    }
+    clt_leaf_rows_finish(&coded.left);
+    clt_leaf_rows_finish(&coded.right);
+  }
+  free(room);
+  return memory ? CLT_OK : clt_fail(error, CLT_FAILED, "no memory for codes of far light of rank %zu", own->rank);
 }
 
 static clt_status check_request(const clt_transport *from, double tolerance, clt_error *error) {
@@ -100,6 +155,24 @@ static clt_status check_request(const clt_transport *from, double tolerance, clt
                     from->cols);
   }
   return CLT_OK;
+}
+
+/* Row sums, error and bits. Codes add no more than a part of what leaves leave out, and of what they may. */
+static clt_status finish(const clt_transport *from, clt_transport *to, double tolerance, clt_error *error) {
+  static const double SHARE = 0.3;
+  const clt_hierarchy_storage *own = to->storage;
+  clt_status status = match_floods(from, to, error);
+  if (status == CLT_OK) {
+    status = measure_error(from, to, error);
+  }
+  if (status == CLT_OK) {
+    status = pack(to, SHARE * fmin(tolerance, own->error), error);
+  }
+  if (status == CLT_OK && own->left.bits < 32) {
+    status = match_floods(from, to, error);
+    status = status == CLT_OK ? measure_error(from, to, error) : status;
+  }
+  return status;
 }
 
 clt_status clt_transport_create_hierarchy(const clt_transport *from, double tolerance, clt_transport **out,
@@ -121,10 +194,7 @@ clt_status clt_transport_create_hierarchy(const clt_transport *from, double tole
     status = clt_transport_copy_planes(from, to, error);
   }
   if (status == CLT_OK) {
-    status = match_floods(from, to, error);
-  }
-  if (status == CLT_OK) {
-    status = measure_error(from, to, error);
+    status = finish(from, to, tolerance, error);
   }
   if (status != CLT_OK) {
     clt_transport_destroy(to);

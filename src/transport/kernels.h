@@ -26,6 +26,16 @@ typedef struct clt_plain_kernels {
   void (*add_double)(const double *const row[CLT_PLAIN_ROWS], const double y[CLT_PLAIN_ROWS], size_t count, double *x);
 } clt_plain_kernels;
 
+/* The same in float. */
+typedef struct clt_float_kernels {
+  const char *needs;
+  bool (*runs_here)(void);
+  /* x_k += (y_0 row_0k + y_1 row_1k) + (y_2 row_2k + y_3 row_3k) */
+  void (*add)(const float *const row[CLT_PLAIN_ROWS], const float y[CLT_PLAIN_ROWS], size_t count, float *x);
+  /* sum_r = sum over k < count of row_rk x_k, in 8 partial sums */
+  void (*dot)(const float *const row[CLT_PLAIN_ROWS], const float *x, size_t count, float sum[CLT_PLAIN_ROWS]);
+} clt_float_kernels;
+
 /* Four columns of `count` numbers at a time, for products both ways at once. */
 typedef struct clt_pass_kernels {
   const char *needs;
@@ -76,6 +86,8 @@ typedef struct clt_half_kernels {
   bool (*runs_here)(void);
   /* sum over k < count of code_k x_k in CLT_LANES partial sums */
   double (*dot)(const uint16_t *code, const float *x, size_t count);
+  /* the same of four rows, for few columns, in 8 partial sums */
+  void (*dots)(const uint16_t *const code[4], const float *x, size_t count, float sum[4]);
   /* x_k += (y_0 code_0k + y_1 code_1k) + (y_2 code_2k + y_3 code_3k) */
   void (*add)(const uint16_t *const code[4], const float y[4], size_t count, float *x);
 } clt_half_kernels;
@@ -86,18 +98,22 @@ typedef struct clt_byte_kernels {
   bool (*runs_here)(void);
   /* sum over k < count of scale_b code_k x_k, b = k / CLT_BLOCK */
   double (*dot)(const int8_t *code, const float *scale, const float *x, size_t count);
+  /* the same of four rows, for few columns, in 8 partial sums */
+  void (*dots)(const int8_t *const code[4], const float *const scale[4], const float *x, size_t count, float sum[4]);
   /* x_k += (s_0 code_0k + s_1 code_1k) + (s_2 code_2k + s_3 code_3k), s_r = y_r scale_rb */
   void (*add)(const int8_t *const code[4], const float *const scale[4], const float y[4], size_t count, float *x);
 } clt_byte_kernels;
 
 /* Every variant, the fastest first, ended by the portable one and NULL. */
 extern const clt_plain_kernels *const clt_plain_variants[];
+extern const clt_float_kernels *const clt_float_variants[];
 extern const clt_pass_kernels *const clt_pass_variants[];
 extern const clt_leaf_kernels *const clt_leaf_variants[];
 extern const clt_half_kernels *const clt_half_variants[];
 extern const clt_byte_kernels *const clt_byte_variants[];
 /* The first that runs here. */
 const clt_plain_kernels *clt_plain_choose(void);
+const clt_float_kernels *clt_float_choose(void);
 const clt_pass_kernels *clt_pass_choose(void);
 const clt_leaf_kernels *clt_leaf_choose(void);
 const clt_half_kernels *clt_half_choose(void);

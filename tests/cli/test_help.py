@@ -57,7 +57,8 @@ class Bench(unittest.TestCase):
         report = json.loads(answer.stdout)
         self.assertGreater(report["bandwidth_gbs"], 0)
         for kernel in report["kernels"]:
-            self.assertLessEqual({"name", "bytes", "ms", "fraction"}, set(kernel))
+            self.assertLessEqual({"name", "bytes", "bytes_per_cell", "ms", "fraction"}, set(kernel))
+            self.assertAlmostEqual(kernel["bytes_per_cell"] * report["frame"]["cells"], kernel["bytes"], 3)
         self.assertEqual((report["frame"]["cells"], report["frame"]["channels"]), (131072, 3))
         self.assertLessEqual(report["frame"]["p50_ms"], report["frame"]["p99_ms"])
         self.assertIn("report-jacobi-csr-f32", [peer["name"] for peer in report["peers"]])

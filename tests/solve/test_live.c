@@ -383,6 +383,101 @@ static void test_general(void **unused) {
   free(target);
 }
 
+/* Light between two walls of other colours in every channel, far_ij = a_i a_j g_ij, by many blocks. */
+static clt_transport *make_coloured_room(uint64_t *state) {
+  enum { ACROSS = 8, DOWN = 4, BLOCKS = ACROSS * DOWN };
+  int32_t of[CELLS], cell[CELLS];
+  int64_t start[CELLS + 1] = {0};
+  float flux[CELLS], *column = calloc((size_t)VALUES * BLOCKS, sizeof *column), value[VALUES];
+  for (int i = 0; i < CELLS; i++) {
+    of[i] = i % SIDE_X * ACROSS / SIDE_X + ACROSS * (i / SIDE_X * DOWN / SIDE_Y);
+    cell[i] = i;
+    start[i + 1] = i + 1;
+    flux[i] = 1;
+  }
+  for (int at = 0; at < VALUES; at++) {
+    value[at] = (float)(0.8 + 0.4 * test_random(state));
+  }
+  for (int c = 0; c < CHANNELS; c++) {
+    for (int k = 0; k < CELLS * CELLS; k++) {
+      const int i = k / CELLS, j = k % CELLS;
+      const double x = (i % SIDE_X - j % SIDE_X) / 10.0, y = (i / SIDE_X - j / SIDE_X) / 10.0;
+      const double paint[2] = {i % SIDE_X < SIDE_X / 2 ? 1 - 0.3 * c : 0.8,
+                               j % SIDE_X < SIDE_X / 2 ? 1 - 0.3 * c : 0.8};
+      column[((size_t)c * BLOCKS + (size_t)of[j]) * CELLS + (size_t)i] +=
+          (float)(6e-4 * paint[0] * paint[1] / (1 + x * x + y * y));
+    }
+  }
+  const clt_block_parts parts = {BLOCKS, of, flux, column, start, cell, value};
+  clt_transport *made = NULL;
+  clt_error error = {0};
+  assert_ok(clt_transport_create_blocks(SIDE_X, SIDE_Y, CHANNELS, &parts, &made, &error), error);
+  free(column);
+  return made;
+}
+
+/* ||T x - target|| / ||target|| by the products of a transport. */
+static double error_by(const clt_transport *transport, const double *drive, const float *target) {
+  double seen[CELLS], apart = 0, size = 0;
+  for (int c = 0; c < CHANNELS; c++) {
+    clt_transport_apply(transport, c, drive + c * CELLS, seen);
+    for (int i = 0; i < CELLS; i++) {
+      const double wanted = (double)target[c * CELLS + i];
+      apart += (seen[i] - wanted) * (seen[i] - wanted);
+      size += wanted * wanted;
+    }
+  }
+  return sqrt(apart / size);
+}
+
+/* Channels that share their factors, in codes: frames come as near to the best of what is stored as others do, and what
+ * is stored differs from T by no more than it says. */
+static void test_shared(void **unused) {
+  (void)unused;
+  uint64_t state = 5;
+  clt_error error = {0};
+  clt_transport *room = make_coloured_room(&state);
+  clt_certificate *certificate = NULL;
+  clt_live *live = NULL;
+  const clt_live_options options = {.target_error = 1e-3};
+  const clt_solve_options exact = {.method = "bounded", .tolerance = 1e-8, .iteration_limit = 4000};
+  float *target = calloc(2 * VALUES, sizeof *target), *drive = target + VALUES;
+  double *wanted = calloc(3 * VALUES, sizeof *wanted), *best = wanted + VALUES, *mine = best + VALUES;
+  assert_ok(clt_certify(room, &certificate, &error), error);
+  assert_ok(clt_live_create(room, certificate, &options, &live, &error), error);
+  const clt_hierarchy_storage *own = clt_hierarchic_of(live->transport);
+  print_message("rank %zu, %d bits, %g left out\n", own->rank, own->left.bits, own->error);
+  assert_non_null(own->core);
+  assert_true(own->left.sets == 1 && own->left.bits < 32 && own->error < 2e-2);
+  for (int step = 0; step < 12; step++) {
+    clt_live_result result;
+    clt_solve_result solved;
+    const double swing = step < 6 ? 0.3 : 1.5;
+    for (int at = 0; at < VALUES; at++) {
+      const int x = at % SIDE_X, y = at % CELLS / SIDE_X;
+      target[at] = (float)(0.6 + 0.4 * swing * sin(0.4 * x + 0.1 * step) * cos(0.3 * y) + 0.05 * (at / CELLS));
+      target[at] = fmaxf(target[at], 0);
+      wanted[at] = (double)target[at];
+    }
+    assert_ok(clt_live_solve(live, target, drive, &result, &error), error);
+    assert_ok(clt_solve(live->transport, certificate, wanted, &exact, best, &solved, &error), error);
+    for (int at = 0; at < VALUES; at++) {
+      mine[at] = (double)drive[at];
+    }
+    const double stored = error_by(live->transport, mine, target), least = error_by(live->transport, best, target);
+    assert_true(result.converged);
+    assert_near(result.residual, stored, 1e-5 + 1e-4 * stored);
+    assert_true(stored <= least + 1e-3);
+    assert_near(error_by(room, mine, target), stored, 2 * own->error);
+    assert_true(step < 6 ? least < 1e-6 : result.clipped_fraction > 0.05);
+  }
+  free(target);
+  free(wanted);
+  clt_live_destroy(live);
+  clt_certificate_destroy(certificate);
+  clt_transport_destroy(room);
+}
+
 static void test_refusals(void **unused) {
   (void)unused;
   bench used = set_up(0.5, 1e-3, 17);
@@ -425,9 +520,10 @@ static void test_no_target(void **unused) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_targets), cmocka_unit_test(test_warm),      cmocka_unit_test(test_cuts),
-      cmocka_unit_test(test_budget),  cmocka_unit_test(test_variants),  cmocka_unit_test(test_dense),
-      cmocka_unit_test(test_general), cmocka_unit_test(test_refusals),  cmocka_unit_test(test_light),
-      cmocka_unit_test(test_damped),  cmocka_unit_test(test_dim_cells), cmocka_unit_test(test_no_target)};
+      cmocka_unit_test(test_targets),  cmocka_unit_test(test_warm),     cmocka_unit_test(test_cuts),
+      cmocka_unit_test(test_budget),   cmocka_unit_test(test_variants), cmocka_unit_test(test_dense),
+      cmocka_unit_test(test_general),  cmocka_unit_test(test_shared),   cmocka_unit_test(test_refusals),
+      cmocka_unit_test(test_light),    cmocka_unit_test(test_damped),   cmocka_unit_test(test_dim_cells),
+      cmocka_unit_test(test_no_target)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

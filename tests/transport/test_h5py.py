@@ -254,6 +254,72 @@ class Accepted(Case):
             with h5py.File(self.path, 'a') as file:
                 file['hierarchy/' + name][index] = kept
 
+    def test_hierarchy_codes(self):
+        """Factors in 16 and 8 bits, those of each channel and those that channels share with a core."""
+        random = np.random.default_rng(9)
+        leaf, R = np.array([[0, 0, 3, 3], [3, 0, 2, 2], [3, 2, 2, 1]]), 40
+        for bits, shared in ((16, False), (16, True), (8, False), (8, True), (32, True)):
+            sets = 1 if shared else C
+            scale, gather, own, flood = random.random((4, C, N)).astype('f4')
+            parts = {'leaf': leaf, 'scale': scale, 'gather': gather, 'own': own, 'flood': flood, 'error': [0.001],
+                     'start': np.zeros(N + 1, int), 'cell': np.zeros(0, 'i4'), 'value': np.zeros((C, 0), 'f4')}
+            factor = {}
+            for side in ('left', 'right'):
+                if bits == 32:
+                    parts[side] = random.random((sets, 12, R)).astype('f4') - 0.5
+                    factor[side] = parts[side].astype(float)
+                elif bits == 16:
+                    parts[side + '16'] = (random.random((sets, 12, R)) - 0.5).astype('f2')
+                    parts[side + '16_scale'] = random.random((sets, 12)).astype('f4')
+                    factor[side] = parts[side + '16'].astype(float) * parts[side + '16_scale'][..., None]
+                else:
+                    parts[side + '8'] = random.integers(-127, 128, (sets, 12, R)).astype('i1')
+                    parts[side + '8_scale'] = random.random((sets, 12, 2)).astype('f4')
+                    factor[side] = parts[side + '8'] * np.repeat(parts[side + '8_scale'].astype(float), 32, 2)[..., :R]
+            if shared:
+                parts['core'] = random.random((C, R, R)).astype('f4')
+            write(self.path, entries())
+            with h5py.File(self.path, 'a') as file:
+                del file['dense']
+                for name, data in parts.items():
+                    file['hierarchy/' + name] = data
+            P = np.zeros((N, 12))
+            for k, (x, y, w, h) in enumerate(leaf):
+                for i in range(w * h):
+                    u, v = (2 * (i % w) + 1) / w - 1, (2 * (i // w) + 1) / h - 1
+                    P[(y + i // w) * W + x + i % w, 4 * k:4 * k + 4] = 1, u, v, u * v
+            code, answer = show(self.path)
+            self.assertEqual((code, answer['storage']), (0, 'hierarchy'), answer)
+            for c in range(C):
+                left, right = (factor[side][0 if shared else c] for side in ('left', 'right'))
+                core = parts['core'][c].astype(float) if shared else np.eye(R)
+                T = scale[c][:, None] * (P @ left @ core @ right.T @ P.T) * gather[c].astype(float)
+                T += np.diag(own[c].astype(float)) + np.outer(flood[c], np.full(N, 1 / N))
+                size = np.abs(scale[c][:, None] * (np.abs(P @ left) @ core @ np.abs(P @ right).T) * gather[c]).sum() * N
+                np.testing.assert_allclose(answer['forward'][c], T @ (1.0 + np.arange(N)), atol=1e-6 * size, rtol=0)
+                np.testing.assert_allclose(answer['backward'][c], (1.0 + np.arange(N)) @ T, atol=1e-6 * size, rtol=0)
+            bad = [('core', (1, 2, 3), np.nan, 'core[')] if shared else []
+            bad += [('left16_scale', (0, 3), np.inf, 'left16['), ('right16', (0, 1, 5), np.nan, 'right16[')] if bits == 16 else []
+            bad += [('right8_scale', (0, 3, 1), np.nan, 'right8[')] if bits == 8 else []
+            for name, index, value, told in bad:
+                with h5py.File(self.path, 'a') as file:
+                    kept = file['hierarchy/' + name][index]
+                    file['hierarchy/' + name][index] = value
+                code, answer = show(self.path)
+                self.assertEqual(code, 2, (name, answer))
+                self.assertIn('/hierarchy/' + told, answer['message'])
+                with h5py.File(self.path, 'a') as file:
+                    file['hierarchy/' + name][index] = kept
+            for name in ['core'] * shared + ['left%d_scale' % bits] * (bits < 32):
+                with h5py.File(self.path, 'a') as file:
+                    kept = file['hierarchy/' + name][:]
+                    del file['hierarchy/' + name]
+                code, answer = show(self.path)
+                self.assertEqual(code, 2, (name, answer))
+                self.assertIn('/hierarchy/' + name, answer['message'])
+                with h5py.File(self.path, 'a') as file:
+                    file['hierarchy/' + name] = kept
+
     def test_tree(self):
         write(self.path, entries())
         with h5py.File(self.path, 'a') as file:

@@ -77,6 +77,20 @@ static double off_by(const clt_transport *transport, const double *entries, cons
   return sqrt(apart);
 }
 
+/* Some entries of the diagonal, by products with one cell. y holds two channels. */
+static void check_diagonal(const clt_transport *transport, int channel, double *x, double *y) {
+  const size_t cells = clt_transport_describe(transport).cols;
+  double *diagonal = y + cells;
+  clt_transport_diagonal(transport, channel, diagonal);
+  memset(x, 0, cells * sizeof *x);
+  for (size_t i = 7; i < cells; i += cells / 5) {
+    x[i] = 1;
+    clt_transport_apply(transport, channel, x, y);
+    assert_near(y[i], diagonal[i], 1e-6);
+    x[i] = 0;
+  }
+}
+
 /* Noise of the columns grows no leaves and is smoothed: what a leaf of n cells tells of it falls by sqrt(4 / n). The
  * flood, a sum that keeps its noise, is even in this drive: its mean is 0. */
 static void test_noise(void **unused) {
@@ -104,6 +118,50 @@ static void test_noise(void **unused) {
   }
 }
 
+/* The tolerance, and what leaves leave out of noisy columns, say in how many bits far light is kept. Products of a file
+ * are the same to the bit. */
+static void test_bits(void **unused) {
+  (void)unused;
+  static const struct {
+    double noise, tolerance;
+    int bits;
+  } CASES[] = {{5e-2, 5e-2, 8}, {2e-3, 5e-3, 16}, {2e-3, 1e-6, 32}};
+  const size_case size = {64, 48, 3, 0};
+  const size_t cells = 64 * 48;
+  char folder[64], path[128];
+  snprintf(path, sizeof path, "%s/bits.h5", test_folder(folder));
+  for (size_t k = 0; k < 3; k++) {
+    uint64_t state = 3;
+    smooth_room room = make_smooth_room(&size, 0.8, CASES[k].noise, false, &state);
+    clt_transport *made = hierarchy_of(room.blocks, CASES[k].tolerance), *read = NULL;
+    const clt_hierarchy_storage *own = clt_hierarchic_of(made);
+    double *x = random_vector(cells, &state), *y = calloc(4 * cells, sizeof *y);
+    clt_error error = {0};
+    print_message("tolerance %g: %d bits, %zu sets, rank %zu, %.2g left out\n", CASES[k].tolerance, own->left.bits,
+                  own->left.sets, own->rank, own->error);
+    assert_int_equal(own->left.bits, CASES[k].bits);
+    assert_ok(clt_transport_save(made, path, &error), error);
+    assert_ok(clt_transport_load(path, &read, &error), error);
+    assert_int_equal(clt_transport_describe(read).bytes, clt_transport_describe(made).bytes);
+    for (int c = 0; c < 3; c++) {
+      clt_transport_apply(made, c, x, y);
+      clt_transport_apply(read, c, x, y + cells);
+      clt_transport_apply_transposed(made, c, x, y + 2 * cells);
+      clt_transport_apply_transposed(read, c, x, y + 3 * cells);
+      assert_memory_equal(y, y + cells, cells * sizeof *y);
+      assert_memory_equal(y + 2 * cells, y + 3 * cells, cells * sizeof *y);
+      check_diagonal(made, c, x, y);
+    }
+    free(x);
+    free(y);
+    clt_transport_destroy(made);
+    clt_transport_destroy(read);
+    finish_smooth_room(&room);
+  }
+  unlink(path);
+  rmdir(folder);
+}
+
 static void test_refusals(void **unused) {
   (void)unused;
   const size_case size = {9, 8, 1, 0};
@@ -122,6 +180,7 @@ static void test_refusals(void **unused) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {cmocka_unit_test(test_products), cmocka_unit_test(test_thread_count),
-                                     cmocka_unit_test(test_noise), cmocka_unit_test(test_refusals)};
+                                     cmocka_unit_test(test_noise), cmocka_unit_test(test_bits),
+                                     cmocka_unit_test(test_refusals)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
