@@ -1,6 +1,7 @@
 /* What passes over a hierarchy read, laid out as they read it: leaf by leaf, strip by strip, row by row. Planes of a
  * power of two cells, one beside the other, would share a few cache lines, and rows of a picture break off where a leaf
  * ends. */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -60,8 +61,10 @@ static int32_t whole(float value, float unit) {
   return unit > 0 ? (int32_t)lrintf(value / (unit * HALF)) : 0;
 }
 
+/* The unit by which the largest is MOST; 0 where it would lose digits, and what is so small is none. */
 static float unit_for(float most) {
-  return most / MOST / HALF;
+  const float unit = most / MOST / HALF;
+  return unit >= FLT_MIN ? unit : 0;
 }
 
 static clt_status fail(const clt_far *far, clt_error *error) {

@@ -274,7 +274,8 @@ static void test_damped(void **unused) {
   free(target);
 }
 
-/* A cell whose near light is less than half of the diagonal of T is given half of that, in its leaf only. */
+/* A cell whose near light is less than half of the diagonal of T is given half of that, in its leaf only. Black that is
+ * all but none is none. */
 static void test_dim_cells(void **unused) {
   (void)unused;
   enum { DIM_CELL = 3 * SIDE_X + 5 };
@@ -286,12 +287,16 @@ static void test_dim_cells(void **unused) {
   assert_ok(clt_transport_create_hierarchy(used.room.blocks, 5e-3, &dim, &error), error);
   clt_hierarchic_of(dim)->own[CELLS + DIM_CELL] = 0;
   clt_transport_diagonal(dim, 1, diagonal);
+  for (size_t i = 0; i < CELLS; i++) {
+    clt_transport_black(dim, 2)[i] = 1e-35f;
+  }
   assert_ok(clt_live_create(dim, used.certificate, NULL, &live, &error), error);
   const clt_far *far = live->own;
   size_t damped = 0;
   for (size_t k = 0; k < far->items; k++) {
     const clt_live_item *item = &far->item[k];
     damped += item->damped;
+    assert_true((item->unit[CLT_LIVE_BLACK] > 0) == (item->channel == 1));
     for (size_t at = 0; item->damped && at < strips_of(far, item) * CLT_LIVE_LANES; at++) {
       const size_t cell = cell_of(far, item, at / CLT_LIVE_LANES, at % CLT_LIVE_LANES);
       const double own = cell < CELLS ? (double)far->hierarchy->own[CELLS + cell] : 0;
