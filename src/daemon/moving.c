@@ -23,7 +23,7 @@ enum { DIRECT_MOST = 30 };
 
 typedef struct mover {
   const daemon_boxes *boxes;
-  int threads;        /* that there are for a frame that is short of time */
+  rank_work work;     /* to compute a frame */
   bool behind;        /* this thread goes behind that of the glass, which cannot be undone */
   moving_job *job;    /* in work; NULL: none */
   player *playing;    /* NULL: nothing moves */
@@ -117,7 +117,7 @@ static void take_job(mover *self, moving_job *job) {
   self->playing = goes_on ? NULL : self->playing;
   stop_playing(self);
   *self = (mover){.boxes = self->boxes,
-                  .threads = self->threads,
+                  .work = self->work,
                   .behind = self->behind,
                   .job = job,
                   .playing = kept,
@@ -207,24 +207,19 @@ static double pass_time(mover *self, bool fresh) {
   return before_ns != 0 ? 1e-9 * (double)(self->told_ns - before_ns) : refresh_s(self);
 }
 
-/* A frame that has time leaves a processor to what paints and decodes meanwhile. */
-static void take_share(const mover *self) {
-  const double left_s = 1e-9 * (double)(self->frame.due_ns - clt_clock_ns());
-  rank_share(!is_live(self) && left_s > refresh_s(self) ? self->threads - 1 : self->threads);
-}
-
 static void show_frame(mover *self, bool fresh, int skipped) {
   clt_transport_info grid = {.width = UNCOMPENSATED_CELLS, .height = UNCOMPENSATED_CELLS, .cols = 1};
   clt_error error = {0};
   int64_t start_ns = clt_clock_ns();
   double seconds = pass_time(self, fresh);
-  take_share(self);
   if (self->frames != NULL) {
     grid = clt_transport_describe(self->job->model->transport);
   }
   reel_picture *letter = reel_blank(self->boxes->reel, 2 * COLOURS * grid.cols * sizeof(float));
+  rank_begin(&self->work, is_live(self) ? 0 : 1, self->frame.shape.seconds);
   clt_status status = letter != NULL ? compute(self, letter, grid.cols, seconds, &error)
                                      : clt_fail(&error, CLT_FAILED, "out of memory");
+  rank_end(&self->work);
   self->computed_ns = start_ns;
   self->repeats = fresh ? 0 : self->repeats + 1;
   self->settled = status != CLT_OK || self->found.last.settled || self->repeats >= REPEATS_MOST;
@@ -280,7 +275,7 @@ static double pause_s(mover *self) {
 }
 
 void *moving_run(void *boxes) {
-  mover self = {.boxes = boxes, .threads = rank_threads()};
+  mover self = {.boxes = boxes, .work = rank_open()};
   bool stopping = false;
   while (!stopping) {
     moving_job *job = clt_mailbox_take(self.boxes->moving_jobs, pause_s(&self));

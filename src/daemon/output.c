@@ -24,7 +24,7 @@ struct output {
   reel_picture *moving; /* the latest; NULL: nothing moves */
   float *moving_codes;  /* of it on this panel, where the projector does not encode by itself */
   int64_t at_ns;        /* the refresh of this turn, by the clock */
-  int threads;          /* that a picture is encoded by, where nothing else is computed meanwhile */
+  rank_work work;       /* to show a moving picture */
   bool measuring;       /* a pattern is on the glass and stays there */
   output_frames frames;
   int64_t reported_ns;
@@ -191,7 +191,6 @@ static clt_status present_moving(output *main, int64_t *shown_ns, clt_error *err
   const clt_projector_info *panel = &main->panel;
   size_t count = (size_t)panel->channels * (size_t)panel->height * (size_t)panel->width;
   picture->seed = (uint32_t)main->frames.presented;
-  rank_share(main->moving->beside ? main->threads / 2 : main->threads);
   if (projector->driver->present_live != NULL) {
     clt_status status = projector->driver->present_live(projector, picture, shown_ns, error);
     main->frames.presented += status == CLT_OK;
@@ -216,7 +215,13 @@ static void show_picture(output *main) {
   if (main->measuring || !main->open || (main->codes == NULL && !moves)) {
     return;
   }
+  if (moves) {
+    rank_begin(&main->work, main->moving->beside ? main->work.all / 2 : 0, refresh_of(main));
+  }
   clt_status status = moves ? present_moving(main, &shown_ns, &error) : present(main, main->codes, &shown_ns, &error);
+  if (moves) {
+    rank_end(&main->work);
+  }
   if (status == CLT_OK) {
     main->frames.picture = true;
   } else {
@@ -258,7 +263,7 @@ static void turn(output *main) {
 }
 
 void output_run(output *main) {
-  main->threads = rank_threads();
+  main->work = rank_open();
   while (!main->stopping) {
     turn(main);
   }

@@ -4,15 +4,24 @@
 #ifndef CLT_DAEMON_RANK_H
 #define CLT_DAEMON_RANK_H
 
-/* Steps of niceness between what stands on the glass, what is computed ahead of its time, and what is decoded ahead of
- * that or has no time at all (a new drive, what accuracy costs). */
+/* Steps of niceness between what stands on the glass, what is decoded and computed ahead of its time, and what has no
+ * time at all (a new drive, what accuracy costs). */
 enum { RANK_AHEAD = 5 };
 
 /* Lets the calling thread, and those that it starts from now on, go behind the others by so many steps. */
 void rank_behind(int steps);
-/* How many threads the loops of the calling thread have from now on, 1 at least. */
-void rank_share(int threads);
-/* How many they have at present. */
-int rank_threads(void);
+
+/* Work that the calling thread does again and again, by loops that are shared among threads. */
+typedef struct rank_work {
+  int all, taken;  /* threads: that there are, that the work has now */
+  double needed_s; /* of one processor, each time, smoothed */
+  double began_s;
+} rank_work;
+
+rank_work rank_open(void);
+/* The work begins: by as many threads as leave `others` of them to others, 1 at least, where that takes no longer than
+ * within_s by what it took so far, else by all. */
+void rank_begin(rank_work *work, int others, double within_s);
+void rank_end(rank_work *work);
 
 #endif

@@ -46,7 +46,9 @@ def look_at_every_refresh(seconds, hiccup_ms):
         wait_for("the compensated film", lambda: moving(run)["compensated"])
         with run.client() as client:
             client.ask("tradeoff")  # so that it is no longer being measured
-        first, before = glass.stat().st_size // RECORD.itemsize + 1, moving(run)
+        first = glass.stat().st_size // RECORD.itemsize + 1
+        wait_for("a first second", lambda: glass.stat().st_size > RECORD.itemsize * (first + 60))
+        before = moving(run)  # while what came before is solved and measured, turns are missed
         resident = []
         for end in (seconds / 4, seconds):
             wait_for("frames", lambda: glass.stat().st_size > RECORD.itemsize * (first + end * 60))
