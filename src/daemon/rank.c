@@ -34,8 +34,9 @@ void rank_begin(rank_work *work, int others, double within_s) {
   work->began_s = spent_s();
 }
 
-/* The threads of a loop work equally long. */
+/* The threads of a loop work equally long. What counts is the mean over a second or so: a peak is no reason to wait for
+ * each other. */
 void rank_end(rank_work *work) {
-  const double gain = 0.1;
+  const double gain = 0.02;
   work->needed_s += gain * ((spent_s() - work->began_s) * work->taken - work->needed_s);
 }
