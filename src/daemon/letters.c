@@ -11,14 +11,16 @@ clt_status daemon_boxes_init(daemon_boxes *boxes, clt_error *error) {
   if (boxes->wake < 0) {
     return clt_fail(error, CLT_FAILED, "no event descriptor for the control loop: %s", strerror(errno));
   }
+  if (reel_create(&boxes->reel, error) != CLT_OK) {
+    daemon_boxes_finish(boxes);
+    return CLT_FAILED;
+  }
   const struct {
     clt_mailbox **box;
     void (*drop)(void *letter);
   } wanted[] = {
       {&boxes->orders, free},
       {&boxes->drives, output_drive_free},
-      {&boxes->moving, output_moving_free},
-      {&boxes->spares, output_moving_free},
       {&boxes->patterns, output_pattern_free},
       {&boxes->answers, free},
       {&boxes->opened, free},
@@ -42,13 +44,13 @@ clt_status daemon_boxes_init(daemon_boxes *boxes, clt_error *error) {
 }
 
 void daemon_boxes_finish(daemon_boxes *boxes) {
-  clt_mailbox *all[] = {boxes->orders,   boxes->drives,      boxes->patterns,    boxes->answers,
-                        boxes->opened,   boxes->frames,      boxes->progress,    boxes->measure_jobs,
-                        boxes->measured, boxes->solver_jobs, boxes->haste,       boxes->solved,
-                        boxes->moving,   boxes->spares,      boxes->moving_jobs, boxes->moved};
+  clt_mailbox *all[] = {boxes->orders, boxes->drives,   boxes->patterns,     boxes->answers,  boxes->opened,
+                        boxes->frames, boxes->progress, boxes->measure_jobs, boxes->measured, boxes->solver_jobs,
+                        boxes->haste,  boxes->solved,   boxes->moving_jobs,  boxes->moved};
   for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
     clt_mailbox_destroy(all[i]);
   }
+  reel_destroy(boxes->reel);
   if (boxes->wake >= 0) {
     close(boxes->wake);
   }
@@ -102,15 +104,6 @@ void output_pattern_free(void *letter) {
   output_pattern *gone = letter;
   if (gone != NULL) {
     free(gone->codes);
-    free(gone);
-  }
-}
-
-void output_moving_free(void *letter) {
-  output_moving *gone = letter;
-  if (gone != NULL) {
-    player_codes_drop(gone->content);
-    free(gone->fields);
     free(gone);
   }
 }

@@ -12,7 +12,7 @@
  *                          the others do and keeps copies of what they found
  *
  * A letter belongs to the sender until it is put, to the mailbox until it is taken, then to the receiver. Mailboxes
- * keep the latest letter only, so:
+ * (not the reel) keep the latest letter only, so:
  *   - every job has a number, and its answer carries it: an answer with an older number is out of date and dropped;
  *   - a newer job for `measure` cancels the one it works on (noticed at its next pattern);
  *   - control gives `solver` a job only when it has answered the last one: no job of its is ever lost.
@@ -27,13 +27,12 @@
 #include "base/mailbox.h"
 #include "counterlight/counterlight.h"
 #include "daemon/model.h"
-#include "daemon/player.h"
+#include "daemon/reel.h"
 
 typedef struct daemon_boxes {
   clt_mailbox *orders;       /* control -> main: output_order */
   clt_mailbox *drives;       /* control -> main: output_drive */
-  clt_mailbox *moving;       /* moving -> main: output_moving */
-  clt_mailbox *spares;       /* main -> moving: output_moving, to be filled again */
+  reel *reel;                /* moving -> main: reel_picture, several, each by its time; and back, to be filled again */
   clt_mailbox *patterns;     /* measure -> main: output_pattern */
   clt_mailbox *answers;      /* main -> measure: output_answer */
   clt_mailbox *opened;       /* main -> control: output_opened */
@@ -68,15 +67,6 @@ typedef struct output_drive {
   clt_panel panel; /* that it is for */
   uint64_t serial; /* of its content */
 } output_drive;
-
-/* A moving picture to show from now on, unless a drive for newer content is there. */
-typedef struct output_moving {
-  uint64_t serial; /* of its content */
-  clt_live_picture picture;
-  player_codes *content; /* held */
-  float *fields;         /* gain, then offset */
-  size_t fields_room;    /* bytes */
-} output_moving;
 
 /* A picture of panel codes to show at once and until the next pattern; without codes: measuring has ended, the drive
  * comes back. */
@@ -274,7 +264,7 @@ typedef struct moving_job {
 
 typedef struct moving_report {
   uint64_t serial;                /* of the content */
-  uint64_t frames, late, skipped; /* of the film: shown; ready more than a refresh after they were due; passed over */
+  uint64_t frames, late, skipped; /* of the film: shown; of these, more than a refresh late; passed over */
   uint64_t slow;                  /* took longer than a refresh */
   uint64_t slipped;               /* since the film began: decoded after they were due */
   uint64_t direct;                /* compensated, with no time for a step (clt_frames_result) */
@@ -293,7 +283,6 @@ clt_status daemon_image_copy(const clt_image *from, clt_image *to, clt_error *er
 /* Frees of letters that hold more than themselves; each accepts NULL. */
 void output_drive_free(void *letter);
 void output_pattern_free(void *letter);
-void output_moving_free(void *letter);
 void moving_job_free(void *letter);
 void measure_job_free(void *letter);
 void measure_result_free(void *letter);

@@ -1,11 +1,13 @@
 #include "daemon/output.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "daemon/rank.h"
 
 /* The pace while no projector is open, s; and the time between reports. */
 static const double idle_refresh_s = 1.0 / 60, report_s = 0.25;
@@ -16,12 +18,14 @@ struct output {
   bool begun;          /* the station is */
   bool open, stopping; /* the projector is open */
   clt_projector_info panel;
-  clt_panel known;       /* the panel's light, as far as it is known before the rig is */
-  output_drive *drive;   /* the latest; survives a reopening */
-  float *codes;          /* of the drive on this panel */
-  output_moving *moving; /* the latest; NULL: nothing moves */
-  float *moving_codes;   /* of it on this panel, where the projector does not encode by itself */
-  bool measuring;        /* a pattern is on the glass and stays there */
+  clt_panel known;      /* the panel's light, as far as it is known before the rig is */
+  output_drive *drive;  /* the latest; survives a reopening */
+  float *codes;         /* of the drive on this panel */
+  reel_picture *moving; /* the latest; NULL: nothing moves */
+  float *moving_codes;  /* of it on this panel, where the projector does not encode by itself */
+  int64_t at_ns;        /* the refresh of this turn, by the clock */
+  rank_work work;       /* to show a moving picture */
+  bool measuring;       /* a pattern is on the glass and stays there */
   output_frames frames;
   int64_t reported_ns;
   output_frames reported;
@@ -42,7 +46,7 @@ void output_destroy(output *main) {
   if (main != NULL) {
     clt_station_close(&main->station);
     output_drive_free(main->drive);
-    output_moving_free(main->moving);
+    reel_picture_free(main->moving);
     free(main->codes);
     free(main->moving_codes);
     free(main);
@@ -131,14 +135,18 @@ static void take_drive(output *main) {
   }
 }
 
-static void take_moving(output *main) {
-  output_moving *newer = clt_mailbox_take(main->boxes->moving, 0);
-  if (newer != NULL && main->moving != NULL) {
-    player_codes_drop(main->moving->content);
-    main->moving->content = NULL;
-    clt_mailbox_put(main->boxes->spares, main->moving);
-  }
-  main->moving = newer != NULL ? newer : main->moving;
+static double refresh_of(const output *main) {
+  return main->open && main->panel.refresh_s > 0 ? main->panel.refresh_s : idle_refresh_s;
+}
+
+/* Refreshes come regularly, turns begin as soon as there is a processor: the phase follows early ones sooner than late
+ * ones. A turn that a pattern has shortened belongs to the refresh before. */
+static void follow_refresh(output *main) {
+  const double early_gain = 0.5, late_gain = 0.1, refresh_ns = 1e9 * refresh_of(main);
+  const int64_t now_ns = clt_clock_ns();
+  const double expected_ns = refresh_ns * round((double)(now_ns - main->at_ns) / refresh_ns);
+  const double late_ns = (double)(now_ns - main->at_ns) - expected_ns;
+  main->at_ns += llround(expected_ns + (late_ns < 0 ? early_gain : late_gain) * late_ns);
 }
 
 static bool is_moving(const output *main) {
@@ -207,7 +215,13 @@ static void show_picture(output *main) {
   if (main->measuring || !main->open || (main->codes == NULL && !moves)) {
     return;
   }
+  if (moves) {
+    rank_begin(&main->work, main->moving->beside ? main->work.all / 2 : 0, refresh_of(main));
+  }
   clt_status status = moves ? present_moving(main, &shown_ns, &error) : present(main, main->codes, &shown_ns, &error);
+  if (moves) {
+    rank_end(&main->work);
+  }
   if (status == CLT_OK) {
     main->frames.picture = true;
   } else {
@@ -231,11 +245,12 @@ static void report_frames(output *main) {
 }
 
 static void turn(output *main) {
-  double refresh_s = main->open && main->panel.refresh_s > 0 ? main->panel.refresh_s : idle_refresh_s;
+  double refresh_s = refresh_of(main);
   int64_t start_ns = clt_clock_ns();
   obey(main);
   take_drive(main);
-  take_moving(main);
+  follow_refresh(main);
+  reel_take(main->boxes->reel, main->at_ns, refresh_s, &main->moving);
   show_picture(main);
   main->frames.turns++;
   report_frames(main);
@@ -248,6 +263,7 @@ static void turn(output *main) {
 }
 
 void output_run(output *main) {
+  main->work = rank_open();
   while (!main->stopping) {
     turn(main);
   }

@@ -193,10 +193,10 @@ void player_destroy(player *self) {
   free(self);
 }
 
-bool player_take(player *self, int64_t until_ns, player_frame *frame, int *skipped) {
+bool player_take(player *self, int64_t ahead_ns, int64_t until_ns, player_frame *frame, int *skipped) {
   int taken = 0;
   pthread_mutex_lock(&self->lock);
-  while (self->count > 0 && self->slots[self->first].due_ns <= until_ns) {
+  while (self->count > 0 && self->slots[self->first].due_ns <= (taken > 0 ? until_ns : ahead_ns)) {
     const slot *due = &self->slots[self->first];
     player_codes_drop(frame->codes);
     *frame = (player_frame){.codes = due->codes, .shape = due->shape, .due_ns = due->due_ns};

@@ -32,9 +32,9 @@ typedef struct player_frame {
 /* Opens the film and starts to decode: the first frame is due at once. */
 clt_status player_create(const char *path, const clt_film_options *options, player **out, clt_error *error);
 void player_destroy(player *self); /* accepts NULL */
-/* The latest frame that is due by then takes the place of *frame, whose codes are dropped; false where there is none
- * that was not handed out before. *skipped: how many were due before it and are passed over. */
-bool player_take(player *self, int64_t until_ns, player_frame *frame, int *skipped);
+/* The next frame that is due by ahead_ns takes the place of *frame, whose codes are dropped; false where there is none
+ * that was not handed out before. Of those that are due by until_ns only the latest: *skipped are passed over. */
+bool player_take(player *self, int64_t ahead_ns, int64_t until_ns, player_frame *frame, int *skipped);
 /* Seconds from now until the next decoded frame is due (0: it is; infinite: none is decoded). */
 double player_due(player *self);
 /* How many frames were decoded only after they were due, so that the film waited for them. */

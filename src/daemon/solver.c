@@ -8,6 +8,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/places.h"
+#include "daemon/rank.h"
 #include "daemon/resume.h"
 #include "tradeoff/json.h"
 
@@ -278,6 +279,7 @@ static void answer(solver *self, solver_job *job) {
 void *solver_run(void *data) {
   solver *self = data;
   bool stopping = false;
+  rank_behind(2 * RANK_AHEAD);
   while (!stopping) {
     solver_job *job = clt_mailbox_take(self->boxes->solver_jobs, -1);
     stopping = job == NULL || job->kind == SOLVER_STOP;

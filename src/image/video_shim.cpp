@@ -47,6 +47,7 @@ clt_status open_video(const char *path, clt_video **out, clt_video_info *info, c
   return clt_guarded(path, "cannot be opened", error, [&] {
     auto video = std::make_unique<clt_video>();
     video->path = path;
+    cv::setNumThreads(1); // to swap the colours of a frame takes less than to wake threads for it
     clt_status status = open_first(video.get(), error);
     if (status != CLT_OK) {
       return status;

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "counterlight/device.h"
+#include "counterlight/frames.h"
 #include "image/film.h"
 
 enum { BLOCKS = 36 };
@@ -55,6 +56,23 @@ clt_status __wrap_clt_film_next(clt_film *film, uint8_t *codes, clt_film_frame *
 void __wrap_clt_live_dither(float *codes, size_t count, int bits, uint32_t seed) {
   __real_clt_live_dither(codes, count, bits, seed);
   write_strip(codes);
+}
+
+clt_status __real_clt_frames_next(clt_frames *frames, const uint8_t *content, int width, int height, double seconds,
+                                  float *gain, float *offset, clt_frames_result *result, clt_error *error);
+clt_status __wrap_clt_frames_next(clt_frames *frames, const uint8_t *content, int width, int height, double seconds,
+                                  float *gain, float *offset, clt_frames_result *result, clt_error *error);
+
+/* Now and then a frame takes $CLT_HICCUP_MS longer. */
+clt_status __wrap_clt_frames_next(clt_frames *frames, const uint8_t *content, int width, int height, double seconds,
+                                  float *gain, float *offset, clt_frames_result *result, clt_error *error) {
+  enum { BETWEEN = 16 };
+  static int count;
+  const char *longer = getenv("CLT_HICCUP_MS");
+  if (longer != NULL && ++count % BETWEEN == 0) {
+    nanosleep(&(struct timespec){0, 1000000 * atol(longer)}, NULL);
+  }
+  return __real_clt_frames_next(frames, content, width, height, seconds, gain, offset, result, error);
 }
 
 /* The player's first frame is due when it is decoded. */

@@ -48,7 +48,7 @@ static void a_player_says_what_it_waits_for(void **state) {
     failed = player_failed(playing, &error);
   }
   assert_true(failed && strstr(error.message, "counterlight-no-such-input") != NULL);
-  assert_false(player_take(playing, INT64_MAX, &frame, &skipped));
+  assert_false(player_take(playing, INT64_MAX, INT64_MAX, &frame, &skipped));
   player_destroy(playing);
 }
 
@@ -68,7 +68,7 @@ static void colour_bars_are_what_they_are(void **state) {
   }
   assert_ok(player_create(bars, &options, &playing, &error), error);
   for (int k = 0; k < 3000 && taken < 10; k++) {
-    taken += player_take(playing, INT64_MAX, &frame, &skipped);
+    taken += player_take(playing, INT64_MAX, INT64_MAX, &frame, &skipped);
     nanosleep(&(struct timespec){0, 10000000}, NULL);
   }
   assert_int_equal(taken, 10);

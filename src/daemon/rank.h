@@ -1,0 +1,27 @@
+/* Which of the daemon's threads go first where there are more of them than processors, and how many processors each
+ * takes. What shows a film is a row of stages that work at the same time: where each of them takes all processors, they
+ * wait for each other in the middle of their work. */
+#ifndef CLT_DAEMON_RANK_H
+#define CLT_DAEMON_RANK_H
+
+/* Steps of niceness between what stands on the glass, what is decoded and computed ahead of its time, and what has no
+ * time at all (a new drive, what accuracy costs). */
+enum { RANK_AHEAD = 5 };
+
+/* Lets the calling thread, and those that it starts from now on, go behind the others by so many steps. */
+void rank_behind(int steps);
+
+/* Work that the calling thread does again and again, by loops that are shared among threads. */
+typedef struct rank_work {
+  int all, taken;  /* threads: that there are, that the work has now */
+  double needed_s; /* of one processor, each time, smoothed */
+  double began_s;
+} rank_work;
+
+rank_work rank_open(void);
+/* The work begins: by as many threads as leave `others` of them to others, 1 at least, where that takes no longer than
+ * within_s by what it took so far, else by all. */
+void rank_begin(rank_work *work, int others, double within_s);
+void rank_end(rank_work *work);
+
+#endif
