@@ -243,8 +243,8 @@ static double left_out(const channels *all, int c, const clt_shared *shared) {
   return sqrt(norm);
 }
 
-/* As far as the channels' spaces agree, few columns serve all of them to the tolerance, beside what is below it; where they do not, they are
- * left to themselves. */
+/* As far as the channels' spaces agree, few columns serve all of them to the tolerance, beside what is below it; where
+ * they do not, they are left to themselves. */
 static void test_sharing(void **unused) {
   (void)unused;
   static const double APART[] = {0, 0.002, 0.05};
