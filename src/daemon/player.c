@@ -8,6 +8,7 @@
 #include "base/clock.h"
 #include "base/memory.h"
 #include "daemon/input.h"
+#include "daemon/rank.h"
 
 /* Frames decoded ahead; and all that there may be, with those that are decoded into, worked on, on their way and shown.
  */
@@ -35,6 +36,7 @@ struct player {
   int64_t next_ns; /* when the next frame is due; 0: at once */
   uint64_t slipped;
   bool live;         /* an input: frames are due as they come */
+  bool ahead;        /* a file: there is time */
   clt_error problem; /* of the last try */
 };
 
@@ -136,6 +138,9 @@ static bool decode_one(player *self) {
 static void *decode(void *data) {
   player *self = data;
   bool more = true;
+  if (self->ahead) {
+    rank_behind(RANK_AHEAD);
+  }
   pthread_mutex_lock(&self->lock);
   while (more && !self->stopping) {
     if (self->count < SLOTS || self->live) {
@@ -160,6 +165,7 @@ clt_status player_create(const char *path, const clt_film_options *options, play
   }
   pthread_mutex_init(&self->lock, NULL);
   pthread_cond_init(&self->changed, NULL);
+  self->ahead = !input_is(path);
   clt_status status = input_film(path, options, &self->film, error);
   status = status == CLT_OK ? start(self, error) : status;
   if (status != CLT_OK) {

@@ -4,8 +4,8 @@
 #ifndef CLT_DAEMON_RANK_H
 #define CLT_DAEMON_RANK_H
 
-/* Steps of niceness between what stands on the glass, what is decoded and computed ahead of its time, and what has no
- * time at all (a new drive, what accuracy costs). */
+/* Steps of niceness between what stands on the glass, what is computed ahead of its time, and what is decoded ahead of
+ * that or has no time at all (a new drive, what accuracy costs). */
 enum { RANK_AHEAD = 5 };
 
 /* Lets the calling thread, and those that it starts from now on, go behind the others by so many steps. */
