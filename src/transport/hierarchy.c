@@ -83,8 +83,8 @@ void clt_hierarchic_core(const clt_hierarchy_storage *own, int channel, bool tra
 }
 
 size_t clt_hierarchic_scratch(const clt_hierarchy_storage *own) {
-  const size_t parts = own->spans.first_part[CLT_SLICES], ranks = CLT_HIERARCHY_CHUNKS + 2;
-  return 2 * ranks * own->rank + CLT_HIERARCHY_CHUNKS + 1 + CLT_LEAF_SUMS * (own->leaves + parts) +
+  const size_t parts = own->spans.first_part[CLT_SLICES], ranks = (CLT_HIERARCHY_CHUNKS + 2) * own->rank;
+  return ranks + (ranks + 1) / 2 + CLT_HIERARCHY_CHUNKS + 1 + CLT_LEAF_SUMS * (own->leaves + parts) +
          CLT_LEAF_TERMS * own->leaves;
 }
 

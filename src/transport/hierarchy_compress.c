@@ -14,7 +14,6 @@
 #include "transport/hierarchy_share.h"
 #include "transport/hierarchy_tree.h"
 
-enum { STEP = CLT_BLOCK };             /* of the rank: rows are read in blocks */
 static const double SMALLER = 2.0 / 3; /* than without: what channels share must be */
 
 /* The decomposition of one channel under way. */

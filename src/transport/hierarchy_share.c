@@ -78,10 +78,11 @@ static bool decompose(const share *s, stack *of) {
   return true;
 }
 
-/* part = diag(length) vector_c', all x the channel's columns; each column divided by `over` of its singular value. */
-static void project(const share *s, const stack *of, size_t c, bool over, double *part) {
+/* part = diag(length) vector_c', all x the channel's columns: what U'A is, or V'B. By weight: each column as much as
+ * its singular value lies under the tolerance. */
+static void project(const share *s, const stack *of, size_t c, bool weighed, double *part) {
   for (size_t k = s->first[c]; k < s->first[c + 1]; k++) {
-    const double by = over ? s->tolerance[c] / s->of[c].value[k - s->first[c]] : 1;
+    const double by = weighed ? s->tolerance[c] / s->of[c].value[k - s->first[c]] : 1;
     for (size_t i = 0; i < s->all; i++) {
       part[(k - s->first[c]) * s->all + i] = by * of->length[i] * of->vector[i * s->all + k];
     }
@@ -207,7 +208,9 @@ clt_status clt_singular_share(const clt_singular *of, size_t channels, const dou
   free(s.right.columns);
   free(s.core);
   free(s.room);
-  return done ? CLT_OK : clt_fail(error, CLT_FAILED, "no memory for far light that %zu channels share", channels);
+  return done ? CLT_OK
+              : clt_fail(error, CLT_FAILED,
+                         "far light that %zu channels share was not found: no memory, or no singular values", channels);
 }
 
 void clt_shared_finish(clt_shared *shared) {

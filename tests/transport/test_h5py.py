@@ -40,6 +40,16 @@ def write(path, dense, **attributes):
         file['dense'] = dense
 
 
+def leaf_terms(leaf):
+    """1, u, v and u v of every cell in its leaf."""
+    P = np.zeros((N, 4 * len(leaf)))
+    for k, (x, y, w, h) in enumerate(leaf):
+        for i in range(w * h):
+            u, v = (2 * (i % w) + 1) / w - 1, (2 * (i // w) + 1) / h - 1
+            P[(y + i // w) * W + x + i % w, 4 * k:4 * k + 4] = 1, u, v, u * v
+    return P
+
+
 class Case(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -227,11 +237,7 @@ class Accepted(Case):
             for name, data in parts.items():
                 file['hierarchy/' + name] = data
         f4 = {name: np.asarray(data).astype('f4').astype(float) for name, data in parts.items()}
-        P = np.zeros((N, 12))
-        for k, (x, y, w, h) in enumerate(leaf):
-            for i in range(w * h):
-                u, v = (2 * (i % w) + 1) / w - 1, (2 * (i // w) + 1) / h - 1
-                P[(y + i // w) * W + x + i % w, 4 * k:4 * k + 4] = 1, u, v, u * v
+        P = leaf_terms(leaf)
         code, answer = show(self.path)
         self.assertEqual((code, answer['storage']), (0, 'hierarchy'), answer)
         for c in range(C):
@@ -258,6 +264,7 @@ class Accepted(Case):
         """Factors in 16 and 8 bits, those of each channel and those that channels share with a core."""
         random = np.random.default_rng(9)
         leaf, R = np.array([[0, 0, 3, 3], [3, 0, 2, 2], [3, 2, 2, 1]]), 40
+        P = leaf_terms(leaf)
         for bits, shared in ((16, False), (16, True), (8, False), (8, True), (32, True)):
             sets = 1 if shared else C
             scale, gather, own, flood = random.random((4, C, N)).astype('f4')
@@ -283,11 +290,6 @@ class Accepted(Case):
                 del file['dense']
                 for name, data in parts.items():
                     file['hierarchy/' + name] = data
-            P = np.zeros((N, 12))
-            for k, (x, y, w, h) in enumerate(leaf):
-                for i in range(w * h):
-                    u, v = (2 * (i % w) + 1) / w - 1, (2 * (i // w) + 1) / h - 1
-                    P[(y + i // w) * W + x + i % w, 4 * k:4 * k + 4] = 1, u, v, u * v
             code, answer = show(self.path)
             self.assertEqual((code, answer['storage']), (0, 'hierarchy'), answer)
             for c in range(C):
