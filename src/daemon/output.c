@@ -25,7 +25,8 @@ struct output {
   float *moving_codes;  /* of it on this panel, where the projector does not encode by itself */
   int64_t at_ns;        /* the refresh of this turn, by the clock */
   rank_work work;       /* to show a moving picture */
-  bool measuring;       /* a pattern is on the glass and stays there */
+  rank_place place;
+  bool measuring; /* a pattern is on the glass and stays there */
   output_frames frames;
   int64_t reported_ns;
   output_frames reported;
@@ -215,6 +216,7 @@ static void show_picture(output *main) {
   if (main->measuring || !main->open || (main->codes == NULL && !moves)) {
     return;
   }
+  rank_keep_aside(&main->place, moves && main->moving->beside);
   if (moves) {
     rank_begin(&main->work, main->moving->beside ? main->work.all / 2 : 0, refresh_of(main));
   }
@@ -264,6 +266,8 @@ static void turn(output *main) {
 
 void output_run(output *main) {
   main->work = rank_open();
+  main->place = rank_stand();
+  rank_take_turns(RANK_SOON);
   while (!main->stopping) {
     turn(main);
   }

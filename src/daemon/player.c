@@ -135,11 +135,19 @@ static bool decode_one(player *self) {
   return true;
 }
 
+/* A film is decoded when nothing else is to be done, and not where it is computed. */
+static void go_behind(void) {
+  rank_place place = rank_stand();
+  rank_behind(RANK_AHEAD);
+  rank_take_turns(RANK_LONG);
+  rank_keep_aside(&place, true);
+}
+
 static void *decode(void *data) {
   player *self = data;
   bool more = true;
   if (self->ahead) {
-    rank_behind(RANK_AHEAD);
+    go_behind();
   }
   pthread_mutex_lock(&self->lock);
   while (more && !self->stopping) {

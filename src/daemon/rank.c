@@ -2,11 +2,13 @@
 
 #include <errno.h>
 #include <omp.h>
+#include <stdint.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <time.h>
 #include <unistd.h>
 
-/* Linux keeps niceness by threads. Where it cannot be had, all are alike. */
+/* Linux keeps niceness by threads. */
 void rank_behind(int steps) {
   const id_t self = (id_t)gettid();
   errno = 0;
@@ -14,6 +16,48 @@ void rank_behind(int steps) {
   if (errno == 0) {
     setpriority(PRIO_PROCESS, self, niceness + steps);
   }
+}
+
+/* As the kernel lays it out, of which headers disagree. */
+typedef struct attributes {
+  uint32_t size, policy;
+  uint64_t flags;
+  int32_t nice;
+  uint32_t priority;
+  uint64_t runtime_ns, deadline_ns, period_ns;
+} attributes;
+
+/* Linux keeps these by threads as well, from 6.12 on; before, it takes no notice. */
+void rank_take_turns(rank_turn turn) {
+  static const uint64_t slice_us[] = {[RANK_SOON] = 300, [RANK_LONG] = 20000};
+  attributes own = {.size = sizeof own};
+  if (syscall(SYS_sched_getattr, 0, &own, sizeof own, 0) == 0) {
+    own.runtime_ns = 1000 * slice_us[turn];
+    syscall(SYS_sched_setattr, 0, &own, 0);
+  }
+}
+
+rank_place rank_stand(void) {
+  rank_place place = {.aside = false};
+  CPU_ZERO(&place.given);
+  sched_getaffinity(0, sizeof place.given, &place.given);
+  return place;
+}
+
+void rank_keep_aside(rank_place *place, bool aside) {
+  cpu_set_t taken = place->given;
+  int last = CPU_SETSIZE - 1;
+  if (aside == place->aside || CPU_COUNT(&taken) < 2) {
+    return;
+  }
+  while (!CPU_ISSET(last, &taken)) {
+    last--;
+  }
+  if (aside) {
+    CPU_CLR(last, &taken);
+  }
+  sched_setaffinity(0, sizeof taken, &taken);
+  place->aside = aside;
 }
 
 /* Seconds of a processor that the calling thread has had. */

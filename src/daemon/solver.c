@@ -279,7 +279,8 @@ static void answer(solver *self, solver_job *job) {
 void *solver_run(void *data) {
   solver *self = data;
   bool stopping = false;
-  rank_behind(2 * RANK_AHEAD);
+  rank_behind(3 * RANK_AHEAD);
+  rank_take_turns(RANK_LONG);
   while (!stopping) {
     solver_job *job = clt_mailbox_take(self->boxes->solver_jobs, -1);
     stopping = job == NULL || job->kind == SOLVER_STOP;

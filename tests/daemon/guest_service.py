@@ -321,6 +321,14 @@ def the_sandbox_lets_cameras_through_and_nothing_else():
     return None
 
 
+def the_sandbox_lets_threads_go_behind_each_other():
+    """What is computed for later, behind what is on the glass (src/daemon/rank.h)."""
+    wait_showing()
+    ranks = [int(task.joinpath("stat").read_text().rpartition(")")[2].split()[16])
+             for task in pathlib.Path(f"/proc/{process()}/task").iterdir()]
+    assert min(ranks) == 0 and max(ranks) == 15, ranks
+
+
 def the_daemon_goes_up_and_down_with_its_display():
     if shutil.which("cage") is None or shutil.which("seatd") is None:
         return "skip: cage or seatd is not installed"
@@ -368,4 +376,4 @@ if __name__ == "__main__":
           a_hung_frame_loop_is_back_within_three_seconds, killed_while_it_measures_it_comes_back,
           a_state_directory_that_is_full_or_read_only_is_survived, a_clock_that_jumps_changes_nothing,
           a_bad_file_at_reload_keeps_the_old_configuration, the_sandbox_lets_cameras_through_and_nothing_else,
-          the_daemon_goes_up_and_down_with_its_display])
+          the_sandbox_lets_threads_go_behind_each_other, the_daemon_goes_up_and_down_with_its_display])
