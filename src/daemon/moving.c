@@ -277,7 +277,7 @@ static double pause_s(mover *self) {
 void *moving_run(void *boxes) {
   mover self = {.boxes = boxes, .work = rank_open()};
   bool stopping = false;
-  rank_take_turns(RANK_SOON);
+  rank_take_turns(RANK_REFRESH);
   while (!stopping) {
     moving_job *job = clt_mailbox_take(self.boxes->moving_jobs, pause_s(&self));
     if (job != NULL && !job->stop) {

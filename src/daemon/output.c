@@ -216,7 +216,7 @@ static void show_picture(output *main) {
   if (main->measuring || !main->open || (main->codes == NULL && !moves)) {
     return;
   }
-  rank_keep_aside(&main->place, moves && main->moving->beside);
+  rank_keep(&main->place, moves && main->moving->beside ? RANK_ASIDE : RANK_ALL);
   if (moves) {
     rank_begin(&main->work, main->moving->beside ? main->work.all / 2 : 0, refresh_of(main));
   }
@@ -267,7 +267,8 @@ static void turn(output *main) {
 void output_run(output *main) {
   main->work = rank_open();
   main->place = rank_stand();
-  rank_take_turns(RANK_SOON);
+  rank_before(RANK_FIRST);
+  rank_take_turns(RANK_REFRESH);
   while (!main->stopping) {
     turn(main);
   }

@@ -135,23 +135,25 @@ static bool decode_one(player *self) {
   return true;
 }
 
-/* A film is decoded when nothing else is to be done, and not where it is computed. */
-static void go_behind(void) {
-  rank_place place = rank_stand();
-  rank_behind(RANK_AHEAD);
-  rank_take_turns(RANK_LONG);
-  rank_keep_aside(&place, true);
+/* A film is not decoded where it is computed, unless it runs short. */
+static void keep_aside(const player *self, rank_place *place) {
+  if (self->ahead) {
+    rank_keep(place, self->count >= SLOTS / 2 ? RANK_ASIDE : RANK_ALL);
+  }
 }
 
 static void *decode(void *data) {
   player *self = data;
   bool more = true;
+  rank_place place = rank_stand();
   if (self->ahead) {
-    go_behind();
+    rank_behind(RANK_AHEAD);
+    rank_take_turns(RANK_LONG);
   }
   pthread_mutex_lock(&self->lock);
   while (more && !self->stopping) {
     if (self->count < SLOTS || self->live) {
+      keep_aside(self, &place);
       more = decode_one(self);
     } else {
       pthread_cond_wait(&self->changed, &self->lock);

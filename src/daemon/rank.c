@@ -18,6 +18,10 @@ void rank_behind(int steps) {
   }
 }
 
+void rank_before(int steps) {
+  rank_behind(-steps);
+}
+
 /* As the kernel lays it out, of which headers disagree. */
 typedef struct attributes {
   uint32_t size, policy;
@@ -29,7 +33,7 @@ typedef struct attributes {
 
 /* Linux keeps these by threads as well, from 6.12 on; before, it takes no notice. */
 void rank_take_turns(rank_turn turn) {
-  static const uint64_t slice_us[] = {[RANK_SOON] = 300, [RANK_LONG] = 20000};
+  static const uint64_t slice_us[] = {[RANK_REFRESH] = 12000, [RANK_LONG] = 100000};
   attributes own = {.size = sizeof own};
   if (syscall(SYS_sched_getattr, 0, &own, sizeof own, 0) == 0) {
     own.runtime_ns = 1000 * slice_us[turn];
@@ -38,26 +42,26 @@ void rank_take_turns(rank_turn turn) {
 }
 
 rank_place rank_stand(void) {
-  rank_place place = {.aside = false};
+  rank_place place = {.spot = RANK_ALL};
   CPU_ZERO(&place.given);
   sched_getaffinity(0, sizeof place.given, &place.given);
   return place;
 }
 
-void rank_keep_aside(rank_place *place, bool aside) {
+void rank_keep(rank_place *place, rank_spot spot) {
   cpu_set_t taken = place->given;
   int last = CPU_SETSIZE - 1;
-  if (aside == place->aside || CPU_COUNT(&taken) < 2) {
+  if (spot == place->spot || CPU_COUNT(&taken) < 2) {
     return;
   }
   while (!CPU_ISSET(last, &taken)) {
     last--;
   }
-  if (aside) {
+  if (spot == RANK_ASIDE) {
     CPU_CLR(last, &taken);
   }
   sched_setaffinity(0, sizeof taken, &taken);
-  place->aside = aside;
+  place->spot = spot;
 }
 
 /* Seconds of a processor that the calling thread has had. */

@@ -13,23 +13,30 @@
  * that or has no time at all (a new drive, what accuracy costs). */
 enum { RANK_AHEAD = 5 };
 
-/* Lets the calling thread, and those that it starts from now on, go behind the others by so many steps. */
-void rank_behind(int steps);
+/* By how much what stands on the glass goes before what other programs do, where the process may (LimitNICE=). */
+enum { RANK_FIRST = 10 };
 
-/* How long a processor works on a thread before it looks at others. One that asks for little is served soon when it
- * wakes, if it has had no more than its share; one that asks for much is interrupted by those, and else left alone. */
-typedef enum rank_turn { RANK_SOON, RANK_LONG } rank_turn;
+/* Lets the calling thread, and those that it starts from now on, go behind the others by so many steps, or before them.
+ */
+void rank_behind(int steps);
+void rank_before(int steps);
+
+/* How long a processor works on a thread, once it has begun, before it looks at others: what has to be ready within a
+ * refresh asks for most of one; what has longer, for longer, and is interrupted by the former whenever they wake. */
+typedef enum rank_turn { RANK_REFRESH, RANK_LONG } rank_turn;
 void rank_take_turns(rank_turn turn);
 
-/* The processors that the calling thread was given. */
+/* Where a thread runs among the processors that it was given: on all, or on all but the last. So work that is done
+ * ahead of its time finds one on which it is not interrupted by what has to be done at once. */
+typedef enum rank_spot { RANK_ALL, RANK_ASIDE } rank_spot;
 typedef struct rank_place {
   cpu_set_t given;
-  bool aside;
+  rank_spot spot;
 } rank_place;
+/* Of the calling thread. */
 rank_place rank_stand(void);
-/* The thread that stands there, and those that it starts from now on, keep off the last of its processors, where it has
- * two or more: work that is done ahead of its time is not interrupted there. False undoes it. */
-void rank_keep_aside(rank_place *place, bool aside);
+/* The calling thread, and those that it starts from now on. Of one processor, all. */
+void rank_keep(rank_place *place, rank_spot spot);
 
 /* Work that the calling thread does again and again, by loops that are shared among threads. */
 typedef struct rank_work {
