@@ -25,8 +25,8 @@ struct output {
   float *moving_codes;  /* of it on this panel, where the projector does not encode by itself */
   int64_t at_ns;        /* the refresh of this turn, by the clock */
   rank_work work;       /* to show a moving picture */
-  rank_place place;
-  bool measuring; /* a pattern is on the glass and stays there */
+  rank_place place;     /* of this thread: where it leaves processors to others, it keeps off them */
+  bool measuring;       /* a pattern is on the glass and stays there */
   output_frames frames;
   int64_t reported_ns;
   output_frames reported;
@@ -216,10 +216,10 @@ static void show_picture(output *main) {
   if (main->measuring || !main->open || (main->codes == NULL && !moves)) {
     return;
   }
-  rank_keep(&main->place, moves && main->moving->beside ? RANK_ASIDE : RANK_ALL);
   if (moves) {
     rank_begin(&main->work, main->moving->beside ? main->work.all / 2 : 0, refresh_of(main));
   }
+  rank_keep(&main->place, moves && main->work.taken < main->work.all ? RANK_ASIDE : RANK_ALL);
   clt_status status = moves ? present_moving(main, &shown_ns, &error) : present(main, main->codes, &shown_ns, &error);
   if (moves) {
     rank_end(&main->work);

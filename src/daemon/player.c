@@ -35,8 +35,7 @@ struct player {
   bool stopping;
   int64_t next_ns; /* when the next frame is due; 0: at once */
   uint64_t slipped;
-  bool live;         /* an input: frames are due as they come */
-  bool ahead;        /* a file: there is time */
+  bool live;         /* an input: frames are due as they come; of a file there is time */
   clt_error problem; /* of the last try */
 };
 
@@ -100,7 +99,6 @@ static void append(player *self, player_codes *codes, const clt_film_frame *shap
   made->shape = *shape;
   made->due_ns = self->next_ns > now_ns ? self->next_ns : now_ns;
   self->slipped += self->next_ns > 0 && self->next_ns < now_ns;
-  self->live = shape->seconds == 0;
   self->next_ns = self->live ? 0 : made->due_ns + (isfinite(shape->seconds) ? llround(1e9 * shape->seconds) : 0);
   self->count++;
 }
@@ -137,7 +135,7 @@ static bool decode_one(player *self) {
 
 /* A film is not decoded where it is computed, unless it runs short. */
 static void keep_aside(const player *self, rank_place *place) {
-  if (self->ahead) {
+  if (!self->live) {
     rank_keep(place, self->count >= SLOTS / 2 ? RANK_ASIDE : RANK_ALL);
   }
 }
@@ -146,7 +144,7 @@ static void *decode(void *data) {
   player *self = data;
   bool more = true;
   rank_place place = rank_stand();
-  if (self->ahead) {
+  if (!self->live) {
     rank_behind(RANK_AHEAD);
     rank_take_turns(RANK_LONG);
   }
@@ -175,7 +173,7 @@ clt_status player_create(const char *path, const clt_film_options *options, play
   }
   pthread_mutex_init(&self->lock, NULL);
   pthread_cond_init(&self->changed, NULL);
-  self->ahead = !input_is(path);
+  self->live = input_is(path);
   clt_status status = input_film(path, options, &self->film, error);
   status = status == CLT_OK ? start(self, error) : status;
   if (status != CLT_OK) {

@@ -31,7 +31,7 @@ typedef struct attributes {
   uint64_t runtime_ns, deadline_ns, period_ns;
 } attributes;
 
-/* Linux keeps these by threads as well, from 6.12 on; before, it takes no notice. */
+/* Linux keeps slices by threads as well, from 6.12 on; before, it takes no notice. */
 void rank_take_turns(rank_turn turn) {
   static const uint64_t slice_us[] = {[RANK_REFRESH] = 12000, [RANK_LONG] = 100000};
   attributes own = {.size = sizeof own};

@@ -9,8 +9,8 @@
 #include <sched.h>
 #include <stdbool.h>
 
-/* Steps of niceness between what stands on the glass, what is computed ahead of its time, and what is decoded ahead of
- * that or has no time at all (a new drive, what accuracy costs). */
+/* Steps of niceness between what a program does at once, what is computed ahead of its time, what is decoded ahead of
+ * that, and what has no time at all (a new drive, what accuracy costs). */
 enum { RANK_AHEAD = 5 };
 
 /* By how much what stands on the glass goes before what other programs do, where the process may (LimitNICE=). */
