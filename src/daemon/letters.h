@@ -219,7 +219,7 @@ typedef struct solver_job {
   char method[24];               /* SOLVE, ADOPT */
   double tolerance, deadline_s;
   clt_white white;
-  bool moves;               /* LOAD, ADOPT: content does */
+  bool moves;               /* content does */
   clt_transport *transport; /* ADOPT */
   daemon_picture picture;   /* SNAPSHOT */
   clt_image observation;    /* SNAPSHOT; may be empty */

@@ -1,5 +1,6 @@
 #include "daemon/solver.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -262,6 +263,14 @@ static clt_status work(solver *self, solver_job *job, solver_result *result) {
   return works[job->kind](self, job, result);
 }
 
+/* What has no time leaves the processor on which a film's frames are computed to them. What they wait for does not. */
+static void make_room(const solver_job *job, rank_work *of, rank_place *place) {
+  const bool awaited = job->kind == SOLVER_LOAD || job->kind == SOLVER_ADOPT;
+  const bool beside = job->moves && !awaited;
+  rank_keep(place, beside ? RANK_ASIDE : RANK_ALL);
+  rank_begin(of, beside ? 1 : 0, INFINITY);
+}
+
 static void answer(solver *self, solver_job *job) {
   solver_result *result = clt_alloc(1, sizeof *result);
   if (result == NULL) {
@@ -278,6 +287,8 @@ static void answer(solver *self, solver_job *job) {
 
 void *solver_run(void *data) {
   solver *self = data;
+  rank_work all = rank_open();
+  rank_place place = rank_stand();
   bool stopping = false;
   rank_behind(3 * RANK_AHEAD);
   rank_take_turns(RANK_LONG);
@@ -285,6 +296,7 @@ void *solver_run(void *data) {
     solver_job *job = clt_mailbox_take(self->boxes->solver_jobs, -1);
     stopping = job == NULL || job->kind == SOLVER_STOP;
     if (!stopping) {
+      make_room(job, &all, &place);
       answer(self, job);
     }
     solver_job_free(job);

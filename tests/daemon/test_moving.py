@@ -102,6 +102,32 @@ def what_show_brings_stops_the_film_and_reload_starts_it():
         moving(run, lambda m: m["compensated"] and m["frames"] > 10)
 
 
+def solver_place(run):
+    """The processors of the thread that solves: it goes behind all others, but for threads that it started itself."""
+    threads = sorted(int(path.name) for path in (run.process_folder() / "task").iterdir())
+    niceness = [os.getpriority(os.PRIO_PROCESS, thread) for thread in threads]
+    return os.sched_getaffinity(threads[niceness.index(max(niceness))])
+
+
+def what_has_no_time_leaves_a_processor_to_the_film():
+    everywhere = os.sched_getaffinity(0)
+    if len(everywhere) < 2 or os.getpriority(os.PRIO_PROCESS, 0) > 4:
+        return "skip: one processor, or all threads have the last rank"
+    with exhibit() as run:
+        run.write_config(content=film(run), daemon=RETRY + "budget_ms = 200;")
+        run.start()
+        run.wait_state("showing")
+        moving(run, lambda m: m["compensated"])
+        with run.client() as client:
+            client.ask("tradeoff")  # measured while the film plays
+            assert solver_place(run) == everywhere - {max(everywhere)}, (solver_place(run), everywhere)
+            client.ask("show", path=str(run.content))
+            run.wait_state("showing")
+            client.ask("tradeoff")
+        assert solver_place(run) == everywhere, (solver_place(run), everywhere)
+    return None
+
+
 def subscribers_are_told_and_a_new_transport_is_taken_over():
     with exhibit() as run:
         run.write_config(content=film(run), daemon=RETRY + "budget_ms = 200;")
@@ -166,5 +192,6 @@ def what_is_no_film_is_refused():
 if __name__ == "__main__":
     main([a_film_plays_and_is_compensated_once_the_room_is_known, a_film_plays_uncompensated_without_a_camera, scaled_content_says_how_far,
           a_folder_is_shown_picture_by_picture, what_show_brings_stops_the_film_and_reload_starts_it,
+          what_has_no_time_leaves_a_processor_to_the_film,
           subscribers_are_told_and_a_new_transport_is_taken_over, memory_is_constant_and_it_ends_at_once,
           an_input_that_is_missing_is_waited_for, what_is_no_film_is_refused])
