@@ -109,6 +109,8 @@ typedef struct clt_projector_info {
   int width, height, channels; /* panel size in pixels; channels 1 or 3 */
   int bits;                    /* of a code value */
   double refresh_s;            /* s from refresh to refresh */
+  bool waits;                  /* present() waits for refreshes, so that calls in a row come one refresh apart; else it
+                                  returns when it has the picture */
 } clt_projector_info;
 
 typedef struct clt_projector clt_projector;

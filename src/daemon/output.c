@@ -7,6 +7,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "daemon/pace.h"
 #include "daemon/rank.h"
 
 /* The pace while no projector is open, s; and the time between reports. */
@@ -23,7 +24,7 @@ struct output {
   float *codes;         /* of the drive on this panel */
   reel_picture *moving; /* the latest; NULL: nothing moves */
   float *moving_codes;  /* of it on this panel, where the projector does not encode by itself */
-  int64_t at_ns;        /* the refresh of this turn, by the clock */
+  pace pace;            /* of the turns */
   rank_work work;       /* to show a moving picture */
   rank_place place;     /* of this thread: where it leaves processors to others, it keeps off them */
   bool measuring;       /* a pattern is on the glass and stays there */
@@ -140,16 +141,6 @@ static double refresh_of(const output *main) {
   return main->open && main->panel.refresh_s > 0 ? main->panel.refresh_s : idle_refresh_s;
 }
 
-/* Refreshes come regularly, turns begin as soon as there is a processor: the phase follows early ones sooner than late
- * ones. A turn that a pattern has shortened belongs to the refresh before. */
-static void follow_refresh(output *main) {
-  const double early_gain = 0.5, late_gain = 0.1, refresh_ns = 1e9 * refresh_of(main);
-  const int64_t now_ns = clt_clock_ns();
-  const double expected_ns = refresh_ns * round((double)(now_ns - main->at_ns) / refresh_ns);
-  const double late_ns = (double)(now_ns - main->at_ns) - expected_ns;
-  main->at_ns += llround(expected_ns + (late_ns < 0 ? early_gain : late_gain) * late_ns);
-}
-
 static bool is_moving(const output *main) {
   return main->moving != NULL && (main->drive == NULL || main->moving->serial >= main->drive->serial);
 }
@@ -209,12 +200,13 @@ static clt_status present_moving(output *main, int64_t *shown_ns, clt_error *err
   return present(main, main->moving_codes, shown_ns, error);
 }
 
-static void show_picture(output *main) {
+/* False where there is nothing to show, or a pattern stays up. */
+static bool show_picture(output *main) {
   int64_t shown_ns;
   clt_error error = {0};
   bool moves = is_moving(main);
   if (main->measuring || !main->open || (main->codes == NULL && !moves)) {
-    return;
+    return false;
   }
   if (moves) {
     rank_begin(&main->work, main->moving->beside ? main->work.all / 2 : 0, refresh_of(main));
@@ -229,6 +221,7 @@ static void show_picture(output *main) {
   } else {
     lose_projector(main, &error);
   }
+  return status == CLT_OK;
 }
 
 /* Reports now and then, and at once when the first picture is up. */
@@ -247,18 +240,17 @@ static void report_frames(output *main) {
 }
 
 static void turn(output *main) {
-  double refresh_s = refresh_of(main);
-  int64_t start_ns = clt_clock_ns();
+  const double late_part = 1.5, refresh_s = refresh_of(main);
+  pace_begin(&main->pace, clt_clock_ns(), refresh_s);
   obey(main);
   take_drive(main);
-  follow_refresh(main);
-  reel_take(main->boxes->reel, main->at_ns, refresh_s, &main->moving);
-  show_picture(main);
+  reel_take(main->boxes->reel, main->pace.at_ns, refresh_s, &main->moving);
+  const bool waited = show_picture(main) && main->panel.waits;
   main->frames.turns++;
   report_frames(main);
-  double left = refresh_s - clt_clock_since(start_ns);
-  main->frames.late += left < -0.5 * refresh_s;
-  output_pattern *pattern = clt_mailbox_take(main->boxes->patterns, left > 0 ? left : 0);
+  main->frames.late += clt_clock_since(main->pace.begun_ns) > late_part * refresh_s;
+  const double left_s = pace_left(&main->pace, clt_clock_ns(), refresh_s, waited);
+  output_pattern *pattern = clt_mailbox_take(main->boxes->patterns, left_s);
   if (pattern != NULL) {
     take_pattern(main, pattern);
   }

@@ -35,7 +35,7 @@ static source *of_camera(const clt_camera *camera) {
 
 static void describe_projector(const clt_projector *projector, clt_projector_info *info) {
   (void)projector;
-  *info = (clt_projector_info){4, 3, 1, 8, 1 / 60.0};
+  *info = (clt_projector_info){4, 3, 1, 8, 1 / 60.0, false};
 }
 
 static void describe_camera(const clt_camera *camera, clt_camera_info *info) {

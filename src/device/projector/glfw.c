@@ -25,7 +25,8 @@ static void describe(const clt_projector *projector, clt_projector_info *info) {
                                .height = self->glass.height,
                                .channels = CLT_PANEL_CHANNELS,
                                .bits = self->glass.bits,
-                               .refresh_s = self->swap.pacing.period_ns * 1e-9};
+                               .refresh_s = self->swap.pacing.period_ns * 1e-9,
+                               .waits = true};
 }
 
 static void tell_stretched(glfw_projector *self) {

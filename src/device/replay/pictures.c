@@ -185,7 +185,7 @@ clt_status clt_replay_open_pictures(const char *path, int panel_width, int panel
   }
   self->projector = (pictures_projector){{&projector_driver}, self};
   self->camera = (pictures_camera){{&camera_driver}, self};
-  self->panel = (clt_projector_info){panel_width, panel_height, 1, 8, TICK_S};
+  self->panel = (clt_projector_info){panel_width, panel_height, 1, 8, TICK_S, false};
   self->exposure_s = TICK_S;
   self->open = 2;
   pthread_mutex_init(&self->lock, NULL);
