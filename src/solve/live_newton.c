@@ -180,22 +180,24 @@ void clt_newton_light(const clt_far *far, clt_live_item *item) {
                     far->rank, item->far);
 }
 
-/* ||D^-1 V (U'r - q)||^2, of one channel. */
+/* ||D^-1 V (U'r - q)||^2, of one channel. The gram is symmetric: its rows are added up, which goes by vectors. */
 static double drift_of(clt_far *far, int channel) {
   const size_t rank = far->rank;
   const float *gram = of_channel(far->gram, rank * rank, channel), *q = of_channel(far->q, rank, channel);
-  float *apart = of_channel(far->right, 2 * rank, channel);
+  float *apart = of_channel(far->right, 2 * rank, channel), *row = apart + rank;
   double sum = 0;
   fold_taken(far, channel, 0, apart);
   for (size_t r = 0; r < rank; r++) {
     apart[r] -= q[r];
+    row[r] = 0;
   }
   for (size_t r = 0; r < rank; r++) {
-    float row = 0;
     for (size_t k = 0; k < rank; k++) {
-      row += gram[r * rank + k] * apart[k];
+      row[k] += apart[r] * gram[r * rank + k];
     }
-    sum += (double)row * (double)apart[r];
+  }
+  for (size_t r = 0; r < rank; r++) {
+    sum += (double)row[r] * (double)apart[r];
   }
   return fmax(sum, 0);
 }

@@ -200,12 +200,17 @@ INLINE void weigh_row(const view *w, const strip *s, float v, powers sums[3]) {
 
 INLINE void weigh(const clt_far *far, clt_live_item *item) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
+  const clt_live_item *next = next_item(far, item);
   const float gather = item->unit[CLT_LIVE_GATHER], unit[3] = {gather, gather * gather, 1};
   lanes moment[3][CLT_LIVE_MOMENTS] = {0};
   strip s = {.place = item->first};
   view w;
   see(far, item, &leaf, &w);
   for (int32_t top = 0; top < leaf.height; top += CLT_LIVE_ROWS) {
+    foresee(far, next, w.x, top, foreseen(&leaf, top));
+    if (w.bounded) {
+      foresee(far, next, w.target, top, foreseen(&leaf, top));
+    }
     for (int32_t across = 0; across < leaf.width; across += LANES) {
       powers sums[3] = {0};
       for (begin_strip(far, item, &leaf, top, across, &s); s.row < s.end; next_row(&w, &s)) {
