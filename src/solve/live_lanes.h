@@ -55,35 +55,48 @@ INLINE void put_part(float *to, const lanes *from, int32_t count) {
   }
 }
 
-/* Comparisons go by the bits, whose order as whole numbers is that of floats from 0 on: compilers take comparisons of
- * floats apart, lane by lane, where vectors are longer than the processor's. */
+/* Where a vector is one register (`whole`), a comparison of floats is one operation. Where it is several, compilers
+ * take it apart lane by lane: then the bits are compared, whose order as whole numbers is that of floats from 0 on.
+ * What comes out is the same. */
 INLINE void mark_negative(marks *to, const unsigned_marks *bits) {
   *to = (marks)*bits >> 31;
 }
 
 /* Where a value of 0 or more is not 0. */
-INLINE void mark_positive(marks *to, const lanes *value) {
+INLINE void mark_positive(marks *to, const lanes *value, bool whole) {
   const unsigned_marks below = 0 - (unsigned_marks)*value;
-  mark_negative(to, &below);
+  if (whole) {
+    *to = *value > (lanes){0};
+  } else {
+    mark_negative(to, &below);
+  }
 }
 
 /* Where a value is 0 or less, or 1 or more. */
-INLINE void mark_beyond(marks *to, const lanes *value) {
-  const lanes one = (lanes){0} + 1;
+INLINE void mark_beyond(marks *to, const lanes *value, bool whole) {
+  const lanes none = {0}, one = none + 1;
   const unsigned_marks bits = (unsigned_marks)*value, most = (unsigned_marks)one - 1;
   const unsigned_marks beyond = bits | (bits - 1) | (most - bits);
-  mark_negative(to, &beyond);
+  if (whole) {
+    *to = (*value <= none) | (*value >= one);
+  } else {
+    mark_negative(to, &beyond);
+  }
 }
 
-INLINE void clip(lanes *value) {
-  const lanes one = (lanes){0} + 1;
+INLINE void clip(lanes *value, bool whole) {
+  const lanes none = {0}, one = none + 1;
   const unsigned_marks sign = (unsigned_marks)*value;
   marks low, high;
-  mark_negative(&low, &sign);
-  const marks rest = (marks)*value & ~low;
-  const unsigned_marks above = (unsigned_marks)one - (unsigned_marks)rest;
-  mark_negative(&high, &above);
-  *value = (lanes)((rest & ~high) | ((marks)one & high));
+  if (whole) {
+    low = *value <= none;
+    high = *value > one;
+  } else {
+    mark_negative(&low, &sign);
+    const unsigned_marks above = (unsigned_marks)one - (unsigned_marks)((marks)*value & ~low);
+    mark_negative(&high, &above);
+  }
+  *value = (lanes)(((marks)*value & ~low & ~high) | ((marks)one & high));
 }
 
 /* A strip of an item on its way down some rows. */
@@ -165,11 +178,12 @@ typedef struct view {
   float black, unit, mean; /* units of black and of spill; and the drive's mean */
   float far[CLT_LEAF_TERMS], pull[CLT_LEAF_TERMS], turn[CLT_LEAF_TERMS];
   bool pulled; /* pull is not 0 */
+  bool whole;  /* vectors are one register each */
   const ptrdiff_t *offset;
   bool scattered;
 } view;
 
-INLINE void see(const clt_far *far, const clt_live_item *item, const clt_leaf *leaf, view *w) {
+INLINE void see(const clt_far *far, const clt_live_item *item, const clt_leaf *leaf, bool whole, view *w) {
   const float *pull = item->pull, gather = item->unit[CLT_LIVE_GATHER];
   *w = (view){.strip = far->strip,
               .scale = far->scale,
@@ -186,6 +200,7 @@ INLINE void see(const clt_far *far, const clt_live_item *item, const clt_leaf *l
               .unit = item->unit[CLT_LIVE_SPILL],
               .mean = far->mean[item->channel],
               .pulled = pull[0] != 0 || pull[1] != 0 || pull[2] != 0 || pull[3] != 0,
+              .whole = whole,
               .offset = far->offset,
               .scattered = far->scattered};
   for (int t = 0; t < CLT_LEAF_TERMS; t++) {
@@ -271,7 +286,7 @@ INLINE void take_cells(const view *w, const strip *s, cells *c) {
   if (w->diagonal != NULL) {
     take(&diagonal, w->diagonal + s->place * LANES);
   }
-  mark_positive(&c->lit, &diagonal);
+  mark_positive(&c->lit, &diagonal, w->whole);
   c->inverse = (lanes)((marks)(one / diagonal) & c->lit);
   c->scale = one;
   if (w->scale != NULL) {
@@ -307,7 +322,7 @@ INLINE void wish_for(const view *w, const strip *s, const cells *c, float v, con
   lanes by = *r;
   add_pull(w, s, c, v, &by);
   *wish = c->x + c->inverse * by;
-  mark_beyond(held, wish);
+  mark_beyond(held, wish, w->whole);
   *held &= c->lit & w->bounded;
 }
 

@@ -22,7 +22,7 @@ INLINE void judge(const view *w, const strip *s, const cells *c, float v, const 
   marks held;
   wish_for(w, s, c, v, r, &wish, &held);
   lanes within = wish;
-  clip(&within);
+  clip(&within, w->whole);
   const lanes bounded = c->own * (within - c->x), step = w->bounded ? within - c->x : wish - c->x;
   const lanes give = c->gather * step, whole = c->scale * *r, rest = c->scale * (*r - c->own * step);
   const lanes holds = (lanes)((marks)one & held);
@@ -92,13 +92,13 @@ INLINE void tell(const look_sums *sums, bool aims, clt_live_item *item) {
   item->size = aims ? fold_plain(&sums->size) : item->size;
 }
 
-INLINE void pass(const clt_far *far, clt_live_item *item, bool aims) {
+INLINE void pass(const clt_far *far, clt_live_item *item, bool aims, bool whole) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
   const clt_live_item *next = next_item(far, item);
   look_sums sums = {0};
   strip s = {.place = item->first};
   view w;
-  see(far, item, &leaf, &w);
+  see(far, item, &leaf, whole, &w);
   for (int32_t top = 0; top < leaf.height; top += CLT_LIVE_ROWS) {
     foresee(far, next, w.x, top, foreseen(&leaf, top));
     foresee(far, next, w.target, top, foreseen(&leaf, top));
@@ -139,21 +139,21 @@ INLINE void move_row(const view *w, const strip *s, float v, float *next, column
   by -= c.scale * turn;
   add_pull(w, s, &c, v, &by);
   lanes to = c.x + c.inverse * by;
-  clip(&to);
+  clip(&to, w->whole);
   put_part(next + s->at, &to, s->count);
   const lanes gives = c.gather * to;
   add(given, &gives, v);
   *light += (lanes)((marks)to & c.lit);
 }
 
-INLINE void move(const clt_far *far, clt_live_item *item, float *next) {
+INLINE void move(const clt_far *far, clt_live_item *item, float *next, bool whole) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
   const clt_live_item *behind = next_item(far, item);
   terms given = {0};
   lanes light = {0};
   strip s = {.place = item->first};
   view w;
-  see(far, item, &leaf, &w);
+  see(far, item, &leaf, whole, &w);
   for (int32_t top = 0; top < leaf.height; top += CLT_LIVE_ROWS) {
     foresee(far, behind, w.x, top, foreseen(&leaf, top));
     foresee(far, behind, w.target, top, foreseen(&leaf, top));
@@ -198,14 +198,14 @@ INLINE void weigh_row(const view *w, const strip *s, float v, powers sums[3]) {
   add_powers(&sums[2], &pushed, v);
 }
 
-INLINE void weigh(const clt_far *far, clt_live_item *item) {
+INLINE void weigh(const clt_far *far, clt_live_item *item, bool whole) {
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
   const clt_live_item *next = next_item(far, item);
   const float gather = item->unit[CLT_LIVE_GATHER], unit[3] = {gather, gather * gather, 1};
   lanes moment[3][CLT_LIVE_MOMENTS] = {0};
   strip s = {.place = item->first};
   view w;
-  see(far, item, &leaf, &w);
+  see(far, item, &leaf, whole, &w);
   for (int32_t top = 0; top < leaf.height; top += CLT_LIVE_ROWS) {
     foresee(far, next, w.x, top, foreseen(&leaf, top));
     if (w.bounded) {
@@ -232,18 +232,18 @@ INLINE void weigh(const clt_far *far, clt_live_item *item) {
 }
 
 /* Every pass once for each kind of processor. */
-#define VARIANT(name, attributes)                                                                                      \
+#define VARIANT(name, whole, attributes)                                                                               \
   attributes static void aim_##name(const clt_far *far, clt_live_item *item) {                                         \
-    pass(far, item, true);                                                                                             \
+    pass(far, item, true, whole);                                                                                      \
   }                                                                                                                    \
   attributes static void look_##name(const clt_far *far, clt_live_item *item) {                                        \
-    pass(far, item, false);                                                                                            \
+    pass(far, item, false, whole);                                                                                     \
   }                                                                                                                    \
   attributes static void move_##name(const clt_far *far, clt_live_item *item, float *next) {                           \
-    move(far, item, next);                                                                                             \
+    move(far, item, next, whole);                                                                                      \
   }                                                                                                                    \
   attributes static void weigh_##name(const clt_far *far, clt_live_item *item) {                                       \
-    weigh(far, item);                                                                                                  \
+    weigh(far, item, whole);                                                                                           \
   }                                                                                                                    \
   static const clt_live_kernels name = {.needs = NEEDS_##name,                                                         \
                                         .runs_here = has_##name,                                                       \
@@ -257,7 +257,7 @@ static bool has_portable(void) {
 }
 
 #define NEEDS_portable NULL
-VARIANT(portable, )
+VARIANT(portable, false, )
 
 #if defined(__x86_64__)
 /* Vectors of eight as they are; no fused operations, so that the bits of a drive do not depend on the processor. */
@@ -266,14 +266,14 @@ static bool has_avx2(void) {
 }
 
 #define NEEDS_avx2 "AVX2"
-VARIANT(avx2, __attribute__((target("avx2"))))
+VARIANT(avx2, true, __attribute__((target("avx2"))))
 
 static bool has_avx512(void) {
   return __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq");
 }
 
 #define NEEDS_avx512 "AVX-512"
-VARIANT(avx512, __attribute__((target("avx512f,avx512vl,avx512dq"))))
+VARIANT(avx512, true, __attribute__((target("avx512f,avx512vl,avx512dq"))))
 
 const clt_live_kernels *const clt_live_variants[] = {&avx512, &avx2, &portable, NULL};
 #else
