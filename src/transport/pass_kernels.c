@@ -8,7 +8,7 @@
 enum {
   LINE = 16,  /* floats of a cache line */
   LANES = 8,  /* partial sums of a column, so that additions do not wait for each other */
-  AHEAD = 128 /* numbers by which memory is asked early: four streams at once are more than it foresees */
+  AHEAD = 256 /* numbers by which memory is asked early: four streams at once are more than it foresees */
 };
 
 /* Adds in a fixed order, whatever the processor. */
