@@ -216,25 +216,37 @@ INLINE void next_row(const view *w, strip *s) {
   s->place++;
 }
 
+/* Asks memory for what is read of a strip of a row that comes later, into the second cache: streams begin anew with
+ * every page. */
+enum { AHEAD = 32, SECOND = 2 };
+INLINE void foresee_strip(const view *w, const strip *s) {
+  __builtin_prefetch(w->strip + s->place + AHEAD, 0, SECOND);
+  __builtin_prefetch(w->shown + (s->place + AHEAD) * LANES, 0, SECOND);
+}
+
+/* The next pair of spill, likewise. */
+INLINE void take_pair(view *w, lanes *upper, lanes *lower) {
+  marks pair;
+  __builtin_prefetch(w->spill + 2 * AHEAD * LANES, 0, SECOND);
+  memcpy(&pair, w->spill, sizeof pair);
+  take_upper(upper, &pair);
+  take_lower(lower, &pair);
+  w->spill += LANES;
+}
+
 /* What spills over to the rows that a strip is about to go down, as a multiple of the unit: flood, and near light O x.
  */
 INLINE void take_spill(view *w, const strip *s, lanes spill[CLT_LIVE_ROWS]) {
   const float *x = w->x + s->at;
-  for (int32_t row = 0; row < s->end - s->row; row += 2, w->spill += LANES) {
-    marks pair;
-    memcpy(&pair, w->spill, sizeof pair);
-    take_upper(&spill[row], &pair);
-    take_lower(&spill[row + 1], &pair);
+  for (int32_t row = 0; row < s->end - s->row; row += 2) {
+    take_pair(w, &spill[row], &spill[row + 1]);
     spill[row] *= w->mean;
     spill[row + 1] *= w->mean;
   }
   const unsigned char *code = w->code + 1, *end = code + 2 * *w->code;
-  for (; code < end; code += 2, w->spill += LANES) {
-    marks pair;
+  for (; code < end; code += 2) {
     lanes upper, lower, from, beside;
-    memcpy(&pair, w->spill, sizeof pair);
-    take_upper(&upper, &pair);
-    take_lower(&lower, &pair);
+    take_pair(w, &upper, &lower);
     take(&from, x + w->offset[code[0]]);
     take(&beside, x + w->offset[code[1]]);
     spill[code[0] / CLT_LIVE_AROUND] += upper * from;
@@ -257,13 +269,6 @@ INLINE void add_near(const clt_far *far, const clt_live_item *item, const strip 
     }
     (*near)[l] = sum;
   }
-}
-
-/* Asks memory for what is read of a strip of a row that comes later: streams begin anew with every page. */
-INLINE void foresee_strip(const view *w, const strip *s) {
-  enum { AHEAD = 32, SECOND = 2 /* cache */ };
-  __builtin_prefetch(w->strip + s->place + AHEAD, 0, SECOND);
-  __builtin_prefetch(w->shown + (s->place + AHEAD) * LANES, 0, SECOND);
 }
 
 /* What passes know of a strip of a row. */

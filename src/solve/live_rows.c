@@ -66,7 +66,7 @@ INLINE const clt_live_item *next_item(const clt_far *far, const clt_live_item *i
 /* Asks memory for some of a plane's rows over an item to come, which lie too far apart to be foreseen; into the second
  * cache, for in the first they would push each other out. `plane` is of all channels. */
 INLINE void foresee(const clt_far *far, const clt_live_item *item, const float *plane, int32_t row, int32_t end) {
-  enum { LINE = 16, SECOND = 2 };
+  enum { LINE = 16 };
   const clt_leaf leaf = far->hierarchy->leaf[item->leaf];
   const float *at = plane + (size_t)item->channel * far->cells + (size_t)(leaf.y + row) * (size_t)far->width;
   for (int32_t k = row; k < end && k < leaf.height; k++, at += far->width) {
