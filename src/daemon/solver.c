@@ -263,7 +263,8 @@ static clt_status work(solver *self, solver_job *job, solver_result *result) {
   return works[job->kind](self, job, result);
 }
 
-/* What has no time leaves the processor on which a film's frames are computed to them. What they wait for does not. */
+/* What has no time leaves a film's frames the processor on which they are computed; a transport, for which they wait,
+ * does not. */
 static void make_room(const solver_job *job, rank_work *of, rank_place *place) {
   const bool awaited = job->kind == SOLVER_LOAD || job->kind == SOLVER_ADOPT;
   const bool beside = job->moves && !awaited;
