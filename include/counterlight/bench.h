@@ -66,7 +66,8 @@ typedef struct clt_bench_options {
  * the same room. */
 CLT_PUBLIC clt_status clt_bench_room(int width, int height, int blocks, unsigned seed, clt_transport **out,
                                      clt_error *error);
-/* Measures with a transport whose rows are its cells. Progress is not told; it takes some seconds. */
+/* Measures with a transport whose rows are its cells. Progress is not told; it takes some seconds. CLT_BAD_INPUT where
+ * no cell is lit. */
 CLT_PUBLIC clt_status clt_bench(const clt_transport *transport, const clt_bench_options *options,
                                 clt_bench_report *report, clt_error *error);
 

@@ -132,7 +132,7 @@ static inline void fake_world_init(fake_world *world, int width, int height) {
   static const clt_projector_driver projector_driver = {
       .name = "fake", .describe = fake_describe_projector, .present = fake_present};
   static const clt_camera_driver camera_driver = {"fake", fake_describe_camera, fake_set_exposure, fake_next, NULL};
-  *world = (fake_world){.panel = {width, height, FAKE_CHANNELS, 8, 1 / 60.0},
+  *world = (fake_world){.panel = {width, height, FAKE_CHANNELS, 8, 1 / 60.0, false},
                         .sensor = {.width = width * FAKE_K,
                                    .height = height * FAKE_K,
                                    .channels = FAKE_CHANNELS,

@@ -96,6 +96,10 @@ static void test_refusals(void **unused) {
   assert_ok(clt_bench_room(WIDTH, HEIGHT, BLOCKS, 3, &room, &error), error);
   assert_int_equal(clt_bench(room, &bad, &report, &error), CLT_BAD_INPUT);
   clt_transport_destroy(room);
+  assert_ok(clt_transport_create_dense(4, 4, 1, 16, &room, &error), error); /* dark */
+  assert_int_equal(clt_bench(room, NULL, &report, &error), CLT_BAD_INPUT);
+  assert_non_null(strstr(error.message, "no cell of the transport is lit"));
+  clt_transport_destroy(room);
 }
 
 int main(void) {
