@@ -84,7 +84,8 @@ class Station:
         def there():
             status = self.status()
             return status if status["state"] in states else None
-        return wait_for(f"state {'/'.join(states)}", there, 600)
+        # In the guest these are virtual seconds; patterns that are measured again take hundreds of them.
+        return wait_for(f"state {'/'.join(states)}", there, 1500)
 
     def __enter__(self):
         return self
