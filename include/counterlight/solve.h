@@ -42,6 +42,8 @@ CLT_PUBLIC void clt_certificate_destroy(clt_certificate *certificate);
 CLT_PUBLIC const clt_channel_certificate *clt_certificate_channel(const clt_certificate *certificate, int channel);
 /* lit[i] != 0 where cell i of the channel takes part; cols values, owned by the certificate. */
 CLT_PUBLIC const unsigned char *clt_certificate_lit(const clt_certificate *certificate, int channel);
+/* Whether any cell of any channel takes part: else no drive changes what is seen. */
+CLT_PUBLIC bool clt_certificate_any_lit(const clt_certificate *certificate);
 /* F = diag(T) of the channel (cols values), and the flux weights w (cols values, mean 1 over lit cells). */
 CLT_PUBLIC const double *clt_certificate_first_bounce(const clt_certificate *certificate, int channel);
 CLT_PUBLIC const double *clt_certificate_flux(const clt_certificate *certificate, int channel);

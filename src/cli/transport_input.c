@@ -62,10 +62,8 @@ clt_status cli_input_open(const char *path, cli_input *input, clt_error *error) 
 }
 
 clt_status cli_input_check_lit(const cli_input *input, const char *path, clt_error *error) {
-  for (int c = 0; c < input->grid.channels; c++) {
-    if (clt_certificate_channel(input->certificate, c)->lit > 0) {
-      return CLT_OK;
-    }
+  if (clt_certificate_any_lit(input->certificate)) {
+    return CLT_OK;
   }
   return clt_fail(error, CLT_BAD_INPUT,
                   "%s: no cell of this transport is lit, so no drive changes what is seen; measure the transport again",

@@ -15,9 +15,9 @@ typedef struct pace {
  * one before. */
 void pace_begin(pace *self, int64_t now_ns, double refresh_s);
 /* Seconds until the next one is to begin. Turns are planned a refresh apart, whenever each really begins: what waits
- * take too long would add up. Where the projector has waited for its refresh, it is the one that keeps the time, and
- * the next turn begins at once, but for half a refresh at least: a turn that began late would begin late ever after,
- * and miss its refresh in the end. */
+ * take too long would add up. Where the projector has waited for its refresh, it is the one that keeps the time: the
+ * next turn begins at once, though half a refresh after this one at least. Waiting here as well would begin late ever
+ * after what began late once, and miss a refresh in the end. */
 double pace_left(pace *self, int64_t now_ns, double refresh_s, bool waited);
 
 #endif

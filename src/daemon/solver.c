@@ -265,11 +265,11 @@ static clt_status work(solver *self, solver_job *job, solver_result *result) {
 
 /* What has no time leaves a film's frames the processor on which they are computed; a transport, for which they wait,
  * does not. */
-static void make_room(const solver_job *job, rank_work *of, rank_place *place) {
+static void make_room(const solver_job *job, rank_work *threads, rank_place *place) {
   const bool awaited = job->kind == SOLVER_LOAD || job->kind == SOLVER_ADOPT;
   const bool beside = job->moves && !awaited;
   rank_keep(place, beside ? RANK_ASIDE : RANK_ALL);
-  rank_begin(of, beside ? 1 : 0, INFINITY);
+  rank_begin(threads, beside ? 1 : 0, INFINITY);
 }
 
 static void answer(solver *self, solver_job *job) {
@@ -288,7 +288,7 @@ static void answer(solver *self, solver_job *job) {
 
 void *solver_run(void *data) {
   solver *self = data;
-  rank_work all = rank_open();
+  rank_work threads = rank_open();
   rank_place place = rank_stand();
   bool stopping = false;
   rank_behind(3 * RANK_AHEAD);
@@ -297,7 +297,7 @@ void *solver_run(void *data) {
     solver_job *job = clt_mailbox_take(self->boxes->solver_jobs, -1);
     stopping = job == NULL || job->kind == SOLVER_STOP;
     if (!stopping) {
-      make_room(job, &all, &place);
+      make_room(job, &threads, &place);
       answer(self, job);
     }
     solver_job_free(job);

@@ -345,6 +345,14 @@ const clt_channel_certificate *clt_certificate_channel(const clt_certificate *ce
   return &certificate->channel[channel];
 }
 
+bool clt_certificate_any_lit(const clt_certificate *certificate) {
+  bool any = false;
+  for (int c = 0; c < certificate->channels; c++) {
+    any = any || certificate->channel[c].lit > 0;
+  }
+  return any;
+}
+
 const unsigned char *clt_certificate_lit(const clt_certificate *certificate, int channel) {
   return certificate->lit + (size_t)channel * certificate->cols;
 }

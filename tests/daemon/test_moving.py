@@ -23,6 +23,14 @@ def moving(run, check=lambda moved: True, what="a film that moves"):
     return wait_for(what, attempt)
 
 
+def play(run, path):
+    """Starts the daemon with a film; returns when it is compensated."""
+    run.write_config(content=path, daemon=RETRY + "budget_ms = 200;")
+    run.start()
+    run.wait_state("showing")
+    moving(run, lambda m: m["compensated"])
+
+
 def resident(run):
     for line in (run.process_folder() / "status").read_text().splitlines():
         if line.startswith("VmRSS:"):
@@ -85,10 +93,7 @@ def what_show_brings_stops_the_film_and_reload_starts_it():
     with exhibit() as run:
         still = run.content
         path = film(run)
-        run.write_config(content=path, daemon=RETRY + "budget_ms = 200;")
-        run.start()
-        run.wait_state("showing")
-        moving(run, lambda m: m["compensated"])
+        play(run, path)
         with run.client() as client:
             client.ask("show", path=str(still))
         status = run.wait_state("showing")
@@ -114,10 +119,7 @@ def what_has_no_time_leaves_a_processor_to_the_film():
     if len(everywhere) < 2 or os.getpriority(os.PRIO_PROCESS, 0) > 4:
         return "skip: one processor, or all threads have the last rank"
     with exhibit() as run:
-        run.write_config(content=film(run), daemon=RETRY + "budget_ms = 200;")
-        run.start()
-        run.wait_state("showing")
-        moving(run, lambda m: m["compensated"])
+        play(run, film(run))
         with run.client() as client:
             client.ask("tradeoff")  # measured while the film plays
             assert solver_place(run) == everywhere - {max(everywhere)}, (solver_place(run), everywhere)
@@ -128,10 +130,7 @@ def what_has_no_time_leaves_a_processor_to_the_film():
 
 def subscribers_are_told_and_a_new_transport_is_taken_over():
     with exhibit() as run:
-        run.write_config(content=film(run), daemon=RETRY + "budget_ms = 200;")
-        run.start()
-        run.wait_state("showing")
-        moving(run, lambda m: m["compensated"])
+        play(run, film(run))
         with run.client() as client:
             client.ask("subscribe")
             client.ask("reacquire")

@@ -72,6 +72,7 @@ static void check_levels(int width, int height, int depth, bool drawn) {
   assert_int_equal(info.bits, depth / 3);
   assert_int_equal(info.channels, 3);
   assert_near(info.refresh_s, 1 / 60.0, 1e-9);
+  assert_true(info.waits);
   size_t values = (size_t)width * (size_t)height * 3;
   float *codes = malloc(values * sizeof *codes);
   uint16_t *steps = malloc(values * sizeof *steps), *got = malloc(values * sizeof *got);

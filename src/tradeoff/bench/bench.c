@@ -127,16 +127,6 @@ static clt_status measure_peers(const clt_transport *transport, const clt_certif
   return status;
 }
 
-static clt_status check_lit(const clt_transport *transport, const clt_certificate *certificate, clt_error *error) {
-  const int channels = clt_transport_describe(transport).channels;
-  for (int c = 0; c < channels; c++) {
-    if (clt_certificate_channel(certificate, c)->lit > 0) {
-      return CLT_OK;
-    }
-  }
-  return clt_fail(error, CLT_BAD_INPUT, "no cell of the transport is lit, so that there is nothing to compensate");
-}
-
 clt_status clt_bench(const clt_transport *transport, const clt_bench_options *options, clt_bench_report *report,
                      clt_error *error) {
   enum { FRAMES = 120, FRAMES_LEAST = 10, FRAMES_MOST = 100000 };
@@ -149,8 +139,8 @@ clt_status clt_bench(const clt_transport *transport, const clt_bench_options *op
     return clt_fail(error, CLT_BAD_INPUT, "%d frames; a bench takes %d..%d", asked.frames, FRAMES_LEAST, FRAMES_MOST);
   }
   clt_status status = clt_certify(transport, &certificate, error);
-  if (status == CLT_OK) {
-    status = check_lit(transport, certificate, error);
+  if (status == CLT_OK && !clt_certificate_any_lit(certificate)) {
+    status = clt_fail(error, CLT_BAD_INPUT, "no cell of the transport is lit, so that there is nothing to compensate");
   }
   if (status == CLT_OK) {
     status = clt_bench_kernels(transport, certificate, report, error);
