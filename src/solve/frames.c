@@ -56,7 +56,7 @@ static void find_direct(clt_frames *self) {
 
 static clt_status prepare(clt_frames *self, const clt_frames_options *options, clt_error *error) {
   size_t cells = self->info.cols, values = (size_t)self->info.channels * cells;
-  float *work = clt_alloc(COLOURS * cells + 7 * values, sizeof *work);
+  float *work = clt_alloc_large(COLOURS * cells + 7 * values, sizeof *work);
   if (work == NULL) {
     return clt_fail(error, CLT_FAILED, "no memory for moving pictures of %zu cells", cells);
   }

@@ -87,6 +87,10 @@ struct clt_far {
   const clt_live_kernels *kernels;
   int width, channels;
   size_t cells, items, rank;
+  int from, to;            /* the channels that passes and steps are over */
+  bool apart;              /* a channel goes through its first step before the next begins */
+  double share;            /* the gap of all channels to that of the first, when a target is new: of squares */
+  double last_s;           /* that the last frame took */
   bool shared;             /* passes are long enough for threads */
   clt_live_item *item;     /* channel by channel, leaf by leaf */
   size_t strips;           /* of rows, in all items */
@@ -168,16 +172,24 @@ void clt_newton_light(const clt_far *far, clt_live_item *item);
 /* drift[channel] = by how much ||D s||^2 may change where q becomes U'r, from r as it was looked at. */
 void clt_newton_drift(clt_far *far, double drift[CLT_CHANNELS_MAX]);
 
-/* A pass: the items in their turns, few at once. */
+/* The items of the channels that passes are over: the first, and how many. */
+static inline clt_live_item *clt_live_first(const clt_far *far) {
+  return far->item + (size_t)far->from * far->hierarchy->leaves;
+}
+static inline size_t clt_live_count(const clt_far *far) {
+  return (size_t)(far->to - far->from) * far->hierarchy->leaves;
+}
+
+/* A pass: these in their turns, few at once. */
 enum { CLT_LIVE_AT_ONCE = 8 };
 static inline clt_turns clt_live_turns(const clt_far *far) {
-  return clt_turns_of_few(far->items, CLT_LIVE_AT_ONCE);
+  return clt_turns_of_few(clt_live_count(far), CLT_LIVE_AT_ONCE);
 }
 static inline bool clt_live_next(const clt_far *far, clt_turns *turns, clt_live_item **first, clt_live_item **end) {
   size_t from = 0, to = 0;
-  const bool more = clt_turns_next_few(turns, far->items, CLT_LIVE_AT_ONCE, &from, &to);
-  *first = far->item + from;
-  *end = far->item + to;
+  const bool more = clt_turns_next_few(turns, clt_live_count(far), CLT_LIVE_AT_ONCE, &from, &to);
+  *first = clt_live_first(far) + from;
+  *end = clt_live_first(far) + to;
   return more;
 }
 

@@ -8,8 +8,9 @@
 #include "base/memory.h"
 #include "solve/live_factor.h"
 
-enum { STEPS_MAX = 40, STALE_STEPS = 5, WORTH_SHARING = 16384 /* values */ };
-static const double WORSE = 1.001; /* of the least objective: above it a step has gone too far */
+enum { STEPS_MAX = 40, STALE_STEPS = 5 };
+enum { WORTH_SHARING = 16384, WORTH_PARTING = 1 << 20 }; /* values */
+static const double WORSE = 1.001;                       /* of the least objective: above it a step has gone too far */
 static const double MOVED = 0.03; /* of the lit cells: held otherwise than in the factor, from which it is taken anew */
 static const double SLOW = 0.3;   /* of the gap before: what a step leaves with a factor that has aged */
 
@@ -72,9 +73,12 @@ static clt_status create(clt_live *live, clt_error *error) {
                    .kernels = clt_live_choose(),
                    .width = live->info.width,
                    .channels = live->info.channels,
+                   .to = live->info.channels,
                    .cells = live->info.cols,
                    .items = hierarchy->leaves * (size_t)live->info.channels,
                    .rank = hierarchy->rank,
+                   .apart = live->info.channels > 1 && values_of(live) >= WORTH_PARTING,
+                   .share = live->info.channels,
                    .shared = values_of(live) >= WORTH_SHARING};
   far->item = clt_alloc(far->items, sizeof *far->item);
   if (far->item == NULL) {
@@ -113,19 +117,25 @@ static void reset(clt_live *live) {
   }
 }
 
-/* What a pass over the cells has found of the drive as it stands. */
-static void add_up(clt_far *far, frame *at) {
+/* Adds what a pass over the cells has found of the drive as it stands. */
+static void add_up(const clt_far *far, frame *at) {
+  const clt_live_item *item = clt_live_first(far);
+  for (size_t k = 0; k < clt_live_count(far); k++) {
+    at->objective += item[k].residual;
+    at->gap += item[k].gap;
+    at->seen += item[k].seen;
+    at->wanted += item[k].wanted;
+    at->size += item[k].size;
+    at->held += (double)item[k].held[0];
+  }
+}
+
+/* How the drive of every channel stands, found by a pass over each. */
+static void take_stock(clt_far *far, frame *at) {
   const double before = at->gap;
   at->objective = at->gap = at->seen = at->wanted = at->size = 0;
   at->held = 0;
-  for (size_t k = 0; k < far->items; k++) {
-    at->objective += far->item[k].residual;
-    at->gap += far->item[k].gap;
-    at->seen += far->item[k].seen;
-    at->wanted += far->item[k].wanted;
-    at->size += far->item[k].size;
-    at->held += (double)far->item[k].held[0];
-  }
+  add_up(far, at);
   at->renew = before > 0 && at->gap > SLOW * SLOW * before;
   at->stale = at->objective < at->least ? 0 : at->stale + 1;
   if (at->objective < at->least) {
@@ -135,7 +145,8 @@ static void add_up(clt_far *far, frame *at) {
 }
 
 /* The residual and gap of the drive that is known, for the target. */
-static void aim(clt_far *far, frame *at) {
+static void aim(clt_far *far, clt_live_result *result) {
+  const int64_t since_ns = clt_clock_ns();
   clt_turns turns = clt_live_turns(far);
 #pragma omp parallel if (far->shared)
   for (clt_live_item *item, *end; clt_live_next(far, &turns, &item, &end);) {
@@ -143,11 +154,11 @@ static void aim(clt_far *far, frame *at) {
       far->kernels->aim(far, item);
     }
   }
-  add_up(far, at);
+  result->ms[CLT_LIVE_PREPARE] += 1e3 * clt_clock_since(since_ns);
 }
 
 /* The same of the drive that was changed. */
-static void look(clt_far *far, frame *at, clt_live_result *result) {
+static void look(clt_far *far, clt_live_result *result) {
   const int64_t since_ns = clt_clock_ns();
   clt_turns turns = clt_live_turns(far);
 #pragma omp parallel if (far->shared)
@@ -160,7 +171,6 @@ static void look(clt_far *far, frame *at, clt_live_result *result) {
       }
     }
   }
-  add_up(far, at);
   result->ms[CLT_LIVE_ESTIMATE] += 1e3 * clt_clock_since(since_ns);
 }
 
@@ -203,7 +213,7 @@ static bool has_aged(clt_far *far, int channel, bool renew) {
 
 static bool keep_factors(clt_far *far, bool renew) {
   bool aged[CLT_CHANNELS_MAX] = {false}, any = false;
-  for (int c = 0; c < far->channels; c++) {
+  for (int c = far->from; c < far->to; c++) {
     aged[c] = has_aged(far, c, renew);
     any = any || aged[c];
   }
@@ -252,8 +262,9 @@ static void halve(const clt_live *live, clt_far *far) {
   give_again(far);
 }
 
-/* One Newton step of every channel, into the drive that is neither the last nor the best. */
-static bool step(clt_far *far, bool renew) {
+/* One Newton step, into the drive that is neither the last nor the best. */
+static bool step(clt_far *far, bool renew, clt_live_result *result) {
+  const int64_t since_ns = clt_clock_ns();
   const int next = far->now != 0 && far->best != 0 ? 0 : far->now != 1 && far->best != 1 ? 1 : 2;
   if (!keep_factors(far, renew)) {
     return false;
@@ -270,6 +281,7 @@ static bool step(clt_far *far, bool renew) {
     }
   }
   far->now = next;
+  result->ms[CLT_LIVE_SOLVE] += 1e3 * clt_clock_since(since_ns);
   return true;
 }
 
@@ -280,13 +292,87 @@ static bool may_go_on(const clt_live *live, const frame *at, int steps) {
 }
 
 /* From a drive of 0, at which ||b|| is left. There the bounds say little of which cells they will hold. */
-static void start_cold(clt_live *live, clt_far *far, frame *at) {
+static void start_cold(clt_live *live, clt_far *far, frame *at, clt_live_result *result) {
   reset(live);
   at->cold = true;
   at->gap = 0;
   at->least = INFINITY;
   far->open = true;
-  aim(far, at);
+  aim(far, result);
+  take_stock(far, at);
+}
+
+/* Back to the best drive. */
+static void return_to_best(clt_far *far, clt_live_result *result) {
+  far->now = far->best;
+  give_again(far);
+  look(far, result);
+}
+
+static void take_channels(clt_far *far, int from, int to) {
+  far->from = from;
+  far->to = to;
+}
+
+/* Whether the drive is to take a step for what was found of the first channel, and by that, as one frame is like the
+ * one before, of all. A target that is the last one again is found to the bit as the drive was left: it is not. */
+static bool is_due(const clt_live *live, const clt_far *far, const frame *left, const frame *at) {
+  const double enough = live->options.target_error * live->size, budget = 1e-3 * live->options.budget_ms;
+  const bool same = at->gap == left->gap && at->objective == left->objective;
+  return live->size > 0 && !same && at->objective < at->wanted && far->share * at->gap > enough * enough &&
+         !(budget > 0 && far->last_s > budget);
+}
+
+/* Aims at every channel after the first `stepped` of them took a step, which is taken back. */
+static void aim_together(clt_far *far, int stepped, clt_live_result *result) {
+  take_channels(far, 0, stepped);
+  if (stepped > 0) {
+    return_to_best(far, result);
+  }
+  take_channels(far, stepped > 0 ? 0 : 1, far->channels);
+  aim(far, result);
+}
+
+/* Aims, and where a step is due takes the first one: channel by channel, so that what is read of a channel is still in
+ * the cache when it is moved and looked at. Whether a step was taken. */
+static bool begin_apart(const clt_live *live, clt_far *far, frame *at, clt_live_result *result) {
+  frame left = {0}, aimed = {0};
+  double first = 0;
+  int c = 0;
+  far->best = far->now;
+  take_channels(far, 0, 1);
+  add_up(far, &left);
+  for (; c < far->channels; c++) {
+    far->now = far->best;
+    take_channels(far, c, c + 1);
+    aim(far, result);
+    add_up(far, &aimed);
+    first = c == 0 ? aimed.gap : first;
+    if (!isfinite(aimed.size) || (c == 0 && !is_due(live, far, &left, &aimed)) || !step(far, false, result)) {
+      break;
+    }
+    look(far, result);
+  }
+  const bool stepped = c == far->channels;
+  if (stepped) {
+    at->least = aimed.objective;
+    at->gap = aimed.gap;
+  } else {
+    aim_together(far, c, result);
+  }
+  take_channels(far, 0, far->channels);
+  take_stock(far, at);
+  far->share = first > 0 ? (stepped ? aimed.gap : at->gap) / first : far->share;
+  return stepped;
+}
+
+static void begin(const clt_live *live, clt_far *far, frame *at, clt_live_result *result) {
+  if (far->apart) {
+    result->steps = begin_apart(live, far, at, result);
+  } else {
+    aim(far, result);
+    take_stock(far, at);
+  }
 }
 
 /* Steps until the gap is closed; the residual of the drive that is kept is known then. A start that is worse than none,
@@ -294,11 +380,11 @@ static void start_cold(clt_live *live, clt_far *far, frame *at) {
 static void run(clt_live *live, clt_far *far, frame *at, clt_live_result *result) {
   const double enough = live->options.target_error * live->size;
   if (at->objective >= at->wanted && at->gap > enough * enough) {
-    start_cold(live, far, at);
+    start_cold(live, far, at, result);
   }
   while (!(result->converged = is_near(far, at, enough, result))) {
     if (at->stale >= STALE_STEPS && !at->cold) {
-      start_cold(live, far, at);
+      start_cold(live, far, at, result);
     }
     const int64_t since_ns = clt_clock_ns();
     if (!may_go_on(live, at, result->steps)) {
@@ -306,23 +392,16 @@ static void run(clt_live *live, clt_far *far, frame *at, clt_live_result *result
     }
     if (at->objective > WORSE * at->least) {
       halve(live, far);
-    } else if (!step(far, at->renew)) {
+    } else if (!step(far, at->renew, result)) {
       break;
     }
     far->open = false;
     result->steps++;
-    result->ms[CLT_LIVE_SOLVE] += 1e3 * clt_clock_since(since_ns);
-    look(far, at, result);
+    look(far, result);
+    take_stock(far, at);
     at->last_s = clt_clock_since(since_ns);
   }
   far->open = false;
-}
-
-/* After steps that ceased to gain. */
-static void return_to_best(clt_far *far, frame *at, clt_live_result *result) {
-  far->now = far->best;
-  give_again(far);
-  look(far, at, result);
 }
 
 /* The drive that is kept, to the caller. */
@@ -341,15 +420,15 @@ static clt_status solve_frame(clt_live *live, const float *target, float *drive,
   clt_far *far = live->own;
   frame at = {.least = INFINITY};
   far->target = target;
-  aim(far, &at);
+  begin(live, far, &at, result);
   const clt_status status = clt_live_measure(live, at.size, error);
   if (status != CLT_OK) {
     return status;
   }
-  result->ms[CLT_LIVE_PREPARE] = 1e3 * clt_clock_since(live->start_ns);
   run(live, far, &at, result);
   if (!result->converged && far->now != far->best) {
-    return_to_best(far, &at, result);
+    return_to_best(far, result);
+    take_stock(far, &at);
   }
   hand_over(live, far, drive);
   size_t lit = 0;
@@ -359,6 +438,7 @@ static clt_status solve_frame(clt_live *live, const float *target, float *drive,
   result->residual = sqrt(at.objective) / live->size;
   result->clipped_fraction = lit > 0 ? at.held / (double)lit : 0;
   live->seen = sqrt(at.seen) / live->size;
+  far->last_s = clt_clock_since(live->start_ns);
   return CLT_OK;
 }
 

@@ -63,9 +63,9 @@ static float *partial_of(const clt_far *far, int channel, size_t chunk) {
  * one after the other. */
 static void sum_items(const clt_far *far, const clt_leaf_rows *rows, size_t offset) {
 #pragma omp for schedule(static)
-  for (int k = 0; k < far->channels * CHUNKS; k++) {
-    const int channel = k % far->channels;
-    const size_t chunk = (size_t)(k / far->channels);
+  for (int k = 0; k < (far->to - far->from) * CHUNKS; k++) {
+    const int channel = far->from + k % (far->to - far->from);
+    const size_t chunk = (size_t)(k / (far->to - far->from));
     sum_chunk(far, channel, chunk, rows, far->rank, offset, partial_of(far, channel, chunk));
   }
 }
@@ -133,9 +133,9 @@ static void solve_channel(clt_far *far, int channel) {
 void clt_newton_step(clt_far *far) {
   const clt_hierarchy_storage *of = far->hierarchy;
 #pragma omp for schedule(static)
-  for (int k = 0; k < far->channels * CHUNKS; k++) {
-    const int channel = k % far->channels;
-    const size_t chunk = (size_t)(k / far->channels);
+  for (int k = 0; k < (far->to - far->from) * CHUNKS; k++) {
+    const int channel = far->from + k % (far->to - far->from);
+    const size_t chunk = (size_t)(k / (far->to - far->from));
     float *partial = partial_of(far, channel, chunk);
     sum_chunk(far, channel, chunk, &of->right, coupled_steps(far, channel), offsetof(clt_live_item, give), partial);
     if (far->pulled[channel]) {
@@ -143,7 +143,7 @@ void clt_newton_step(clt_far *far) {
     }
   }
 #pragma omp for schedule(dynamic, 1)
-  for (int channel = 0; channel < far->channels; channel++) {
+  for (int channel = far->from; channel < far->to; channel++) {
     solve_channel(far, channel);
   }
 }
@@ -163,7 +163,7 @@ void clt_newton_turn(const clt_far *far, clt_live_item *item) {
 void clt_newton_gather(clt_far *far) {
   sum_items(far, &far->hierarchy->right, offsetof(clt_live_item, given));
 #pragma omp for schedule(dynamic, 1)
-  for (int channel = 0; channel < far->channels; channel++) {
+  for (int channel = far->from; channel < far->to; channel++) {
     float *folded = of_channel(far->folded, far->rank, channel);
     double light = 0;
     for (size_t k = 0; k < leaves_of(far); k++) {
@@ -205,7 +205,7 @@ static double drift_of(clt_far *far, int channel) {
 void clt_newton_drift(clt_far *far, double drift[CLT_CHANNELS_MAX]) {
   sum_items(far, &far->hierarchy->left, offsetof(clt_live_item, whole));
 #pragma omp for schedule(dynamic, 1)
-  for (int channel = 0; channel < far->channels; channel++) {
+  for (int channel = far->from; channel < far->to; channel++) {
     drift[channel] = drift_of(far, channel);
   }
 }

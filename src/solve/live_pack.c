@@ -262,12 +262,12 @@ static clt_status reserve(clt_far *far, const float *diagonal, clt_error *error)
   const size_t margin = ((size_t)far->width + 1 + LANES + PAGE - 1) / PAGE * PAGE;
   const size_t drive = (values + 2 * margin + PAGE - 1) / PAGE * PAGE + APART;
   const bool scaled = is_scaled(far), damped = any_is_damped(far, diagonal);
-  far->strip = clt_alloc(far->strips, sizeof *far->strip);
-  far->spill = clt_alloc(far->blocks, LANES * sizeof *far->spill);
+  far->strip = clt_alloc_large(far->strips, sizeof *far->strip);
+  far->spill = clt_alloc_large(far->blocks, LANES * sizeof *far->spill);
   far->code = clt_alloc(far->codes, 1);
-  far->vectors = clt_alloc(lanes + 3 * drive, sizeof *far->vectors);
-  far->scale = scaled ? clt_alloc(lanes, sizeof *far->scale) : NULL;
-  far->diagonal = damped ? clt_alloc(lanes, sizeof *far->diagonal) : NULL;
+  far->vectors = clt_alloc_large(lanes + 3 * drive, sizeof *far->vectors);
+  far->scale = scaled ? clt_alloc_large(lanes, sizeof *far->scale) : NULL;
+  far->diagonal = damped ? clt_alloc_large(lanes, sizeof *far->diagonal) : NULL;
   if (far->strip == NULL || far->spill == NULL || far->code == NULL || far->vectors == NULL ||
       (scaled && far->scale == NULL) || (damped && far->diagonal == NULL)) {
     return fail(far, error);

@@ -523,12 +523,64 @@ static void test_no_target(void **unused) {
   tear_down(&used);
 }
 
+/* Frame `number` of a film: it moves, its second shot asks for more than any drive gives, its third is so dark that it
+ * is better begun from nothing, and in each shot one frame is that before it again. */
+static void draw_film(const bench *used, int number, float *target) {
+  enum { SHOT = 12, AGAIN = 7 };
+  const int shot = number / SHOT, at = number % SHOT - (number % SHOT >= AGAIN);
+  const double swing = shot == 1 ? 1.5 : 0.3, bright = shot == 2 ? 0.2 : 1.5;
+  for (size_t k = 0; k < VALUES; k++) {
+    const double x = (double)(k % SIDE_X), y = (double)(k % CELLS / SIDE_X), white = k / CELLS == 1 ? 1 : 0.8;
+    const double level = 0.5 + swing * sin(0.3 * x + 0.04 * at + 2 * shot) * cos(0.2 * y - 0.02 * at);
+    target[k] =
+        (float)(white * fmax(level, 0) * clt_certificate_channel(used->certificate, (int)(k / CELLS))->white * bright);
+  }
+}
+
+/* Channel after channel frames come to the bits to which they come together, and one that is refused halfway leaves the
+ * drive as it was, from where others go on. */
+static void test_apart(void **unused) {
+  (void)unused;
+  enum { FRAMES = 36, REFUSED = 18 };
+  float *target = calloc(4 * VALUES, sizeof *target), *drive = target + VALUES, *other = target + 2 * VALUES;
+  bench used = set_up(1.5, 1e-3, 23), apart = set_up(1.5, 1e-3, 23);
+  clt_far *far = apart.live->own;
+  clt_error error = {0};
+  clt_live_result result, found;
+  int stepped = 0, held = 0;
+  far->apart = true;
+  for (int number = 0; number < FRAMES; number++) {
+    draw_film(&used, number, target);
+    if (number == REFUSED) {
+      const float good = target[VALUES - 1];
+      float *last = target + 3 * VALUES;
+      memcpy(last, far->drive[far->now], VALUES * sizeof *last);
+      target[VALUES - 1] = NAN;
+      assert_int_equal(clt_live_solve(apart.live, target, other, &found, &error), CLT_BAD_INPUT);
+      assert_memory_equal(far->drive[far->now], last, VALUES * sizeof *last);
+      target[VALUES - 1] = good;
+    }
+    far->share = number % 2 == 0 ? far->share : 1e9; /* a step is foreseen */
+    solve(&used, target, drive, &result);
+    solve(&apart, target, other, &found);
+    assert_int_equal(found.steps, result.steps);
+    assert_near(found.residual, result.residual, 1e-4);
+    assert_true(number >= REFUSED || memcmp(drive, other, VALUES * sizeof *drive) == 0);
+    stepped += found.steps;
+    held += found.clipped_fraction > 0.05;
+  }
+  assert_true(stepped > FRAMES / 2 && held > FRAMES / 4);
+  free(target);
+  tear_down(&used);
+  tear_down(&apart);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(test_targets),  cmocka_unit_test(test_warm),     cmocka_unit_test(test_cuts),
-      cmocka_unit_test(test_budget),   cmocka_unit_test(test_variants), cmocka_unit_test(test_dense),
-      cmocka_unit_test(test_general),  cmocka_unit_test(test_shared),   cmocka_unit_test(test_refusals),
-      cmocka_unit_test(test_light),    cmocka_unit_test(test_damped),   cmocka_unit_test(test_dim_cells),
-      cmocka_unit_test(test_no_target)};
+      cmocka_unit_test(test_targets),   cmocka_unit_test(test_warm),     cmocka_unit_test(test_cuts),
+      cmocka_unit_test(test_budget),    cmocka_unit_test(test_variants), cmocka_unit_test(test_dense),
+      cmocka_unit_test(test_general),   cmocka_unit_test(test_shared),   cmocka_unit_test(test_refusals),
+      cmocka_unit_test(test_light),     cmocka_unit_test(test_damped),   cmocka_unit_test(test_dim_cells),
+      cmocka_unit_test(test_no_target), cmocka_unit_test(test_apart)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

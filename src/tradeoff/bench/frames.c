@@ -82,7 +82,7 @@ clt_status clt_bench_frames(const clt_transport *transport, const clt_certificat
   film own = {.swing = swing,
               .drive = clt_alloc(values, 2 * sizeof(double)),
               .times = clt_alloc((size_t)options->frames, (1 + CLT_LIVE_STAGES) * sizeof(double)),
-              .target = clt_alloc(values, 2 * sizeof(float))};
+              .target = clt_alloc_large(values, 2 * sizeof(float))};
   openblas_set_num_threads(1); /* counterlight/live.h */
   own.seen = own.drive + values;
   own.answer = own.target + values;
