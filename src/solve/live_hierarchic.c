@@ -253,13 +253,15 @@ static void give_again(clt_far *far) {
 }
 
 /* Back half of the way to the best drive: the objective is convex, and both ends lie within the bounds. */
-static void halve(const clt_live *live, clt_far *far) {
+static void halve(const clt_live *live, clt_far *far, clt_live_result *result) {
+  const int64_t since_ns = clt_clock_ns();
   const float *best = far->drive[far->best];
   float *x = far->drive[far->now];
   for (size_t at = 0; at < values_of(live); at++) {
     x[at] = 0.5f * (x[at] + best[at]);
   }
   give_again(far);
+  result->ms[CLT_LIVE_SOLVE] += 1e3 * clt_clock_since(since_ns);
 }
 
 /* One Newton step, into the drive that is neither the last nor the best. */
@@ -323,10 +325,10 @@ static bool is_due(const clt_live *live, const clt_far *far, const frame *left, 
          !(budget > 0 && far->last_s > budget);
 }
 
-/* Aims at every channel after the first `stepped` of them took a step, which is taken back. */
-static void aim_together(clt_far *far, int stepped, clt_live_result *result) {
-  take_channels(far, 0, stepped);
+/* Aims at the channels that were not, or at all after the first `stepped` of them took a step, which is taken back. */
+static void aim_at_rest(clt_far *far, int stepped, clt_live_result *result) {
   if (stepped > 0) {
+    take_channels(far, 0, stepped);
     return_to_best(far, result);
   }
   take_channels(far, stepped > 0 ? 0 : 1, far->channels);
@@ -338,32 +340,33 @@ static void aim_together(clt_far *far, int stepped, clt_live_result *result) {
 static bool begin_apart(const clt_live *live, clt_far *far, frame *at, clt_live_result *result) {
   frame left = {0}, aimed = {0};
   double first = 0;
-  int c = 0;
+  int stepped = 0;
   far->best = far->now;
   take_channels(far, 0, 1);
   add_up(far, &left);
-  for (; c < far->channels; c++) {
+  for (int c = 0; c < far->channels && stepped == c; c++) {
     far->now = far->best;
     take_channels(far, c, c + 1);
     aim(far, result);
     add_up(far, &aimed);
     first = c == 0 ? aimed.gap : first;
-    if (!isfinite(aimed.size) || (c == 0 && !is_due(live, far, &left, &aimed)) || !step(far, false, result)) {
-      break;
+    if (isfinite(aimed.size) && (c > 0 || is_due(live, far, &left, &aimed)) && step(far, false, result)) {
+      look(far, result);
+      stepped++;
     }
-    look(far, result);
   }
-  const bool stepped = c == far->channels;
-  if (stepped) {
+  const bool all = stepped == far->channels;
+  if (all) {
     at->least = aimed.objective;
     at->gap = aimed.gap;
+    at->last_s = 1e-3 * (result->ms[CLT_LIVE_SOLVE] + result->ms[CLT_LIVE_ESTIMATE]);
   } else {
-    aim_together(far, c, result);
+    aim_at_rest(far, stepped, result);
   }
   take_channels(far, 0, far->channels);
   take_stock(far, at);
-  far->share = first > 0 ? (stepped ? aimed.gap : at->gap) / first : far->share;
-  return stepped;
+  far->share = first > 0 ? (all ? aimed.gap : at->gap) / first : far->share;
+  return all;
 }
 
 static void begin(const clt_live *live, clt_far *far, frame *at, clt_live_result *result) {
@@ -391,7 +394,7 @@ static void run(clt_live *live, clt_far *far, frame *at, clt_live_result *result
       break;
     }
     if (at->objective > WORSE * at->least) {
-      halve(live, far);
+      halve(live, far, result);
     } else if (!step(far, at->renew, result)) {
       break;
     }
