@@ -44,12 +44,14 @@ FOR static inline void NAME(sum_span)(const float *cells, const float *weight, c
 
 FOR static void NAME(sum)(const clt_leaf_in *in, const clt_span *span, size_t spans, double *sums) {
   for (size_t k = 0; k < spans; k++) {
-    const size_t first = (size_t)span[k].first;
-    const double v = in->place[span[k].v];
+    const size_t first = (size_t)span[k].first, count = span[k].count;
+    const float *cells = in->cells + first, *weight = in->weight + first * in->weight_step;
+    const double *x = in->x + first * in->x_step, v = in->place[span[k].v];
     double of[3], *to = sums + CLT_LEAF_SUMS * span[k].part;
-    NAME(sum_span)
-    (in->cells + first, in->weight + first * in->weight_step, in->x + first * in->x_step, in->place + span[k].u,
-     span[k].count, of);
+    foresee_floats(cells, count);
+    foresee_floats(weight, count);
+    foresee_doubles(x, count);
+    NAME(sum_span)(cells, weight, x, in->place + span[k].u, count, of);
     to[0] += of[0];
     to[1] += of[1];
     to[2] += v * of[0];
@@ -67,6 +69,9 @@ FOR static void NAME(spread)(const clt_leaf_out *out, const clt_span *span, size
     const double *f = out->f + CLT_PLAIN_ROWS * out->leaf[span[s].part];
     const double even = f[0] + v * f[2], tilted = f[1] + v * f[3];
     double *y = out->y + first;
+    foresee_floats(cells, count);
+    foresee_floats(own, count);
+    foresee_floats(flood, count);
     size_t k = 0;
     for (; k + WIDE <= count; k += WIDE) {
       const NAME(wide) far = TAKE(cells + k) * (even + tilted * NAME(doubles)(u + k));

@@ -102,6 +102,17 @@ typedef struct leaf {
   const float *scale[TERMS];
 } leaf;
 
+/* Asks memory for the rows of a leaf to come, into the second cache. */
+static void foresee(const leaf *of, const clt_leaf_rows *rows) {
+  enum { AHEAD = 8 /* leaves */, LINE = 64, SECOND = 2 };
+  const void *plain = of->value[0], *half = of->half[0], *byte = of->byte[0];
+  const char *at = plain != NULL ? plain : half != NULL ? half : byte;
+  const size_t bytes = TERMS * rows->rank * (size_t)rows->bits / 8;
+  for (size_t k = 0; k < bytes; k += LINE) {
+    __builtin_prefetch(at + AHEAD * bytes + k, 0, SECOND);
+  }
+}
+
 static leaf leaf_of(const clt_leaf_rows *rows, int channel, size_t at) {
   const size_t first = row_of(rows, channel, at), blocks = clt_leaf_rows_blocks(rows->rank);
   leaf of = {{0}, {0}, {0}, {0}};
@@ -112,6 +123,7 @@ static leaf leaf_of(const clt_leaf_rows *rows, int channel, size_t at) {
     of.byte[t] = rows->bits == 8 ? rows->byte + row * rows->rank : NULL;
     of.scale[t] = rows->bits == 8 ? rows->scale + row * blocks : rows->bits == 16 ? rows->scale + row : NULL;
   }
+  foresee(&of, rows);
   return of;
 }
 
