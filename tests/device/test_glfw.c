@@ -200,23 +200,48 @@ enum {
   LIVE_VALUES = 3 * LIVE_WIDTH * LIVE_HEIGHT
 };
 
+/* A screen, the projector on it, and a moving picture with what stands there of it. */
+typedef struct live_stage {
+  uint8_t content[LIVE_VALUES];
+  float gain[3 * GRID_WIDTH * GRID_HEIGHT], offset[3 * GRID_WIDTH * GRID_HEIGHT];
+  float codes[LIVE_VALUES]; /* 0..1, plane after plane, as the processor computes them */
+  uint16_t got[LIVE_VALUES];
+  test_display display;
+  clt_projector *projector;
+} live_stage;
+
+static live_stage *open_stage(bool drawn) {
+  live_stage *stage = calloc(1, sizeof *stage);
+  assert_non_null(stage);
+  assert_true(drawn ? test_display_unshared("160x120x24", &stage->display)
+                    : test_display_xvfb("160x120x24", &stage->display));
+  stage->projector = open_projector(0, 0, false);
+  return stage;
+}
+
+static void close_stage(live_stage *stage) {
+  stage->projector->driver->close(stage->projector);
+  test_display_stop(&stage->display);
+  free(stage);
+}
+
 /* A moving picture of random content, correction, responses and crosstalk. */
-static clt_live_picture draw_live(uint64_t seed, uint8_t *content, float *gain, float *offset) {
+static clt_live_picture draw_live(uint64_t seed, live_stage *stage) {
   static const double mixed[9] = {0.9, 0.08, 0.02, 0.05, 0.9, 0.05, 0.01, 0.09, 0.9};
   clt_error error = {0};
   clt_live_picture picture = {.width = LIVE_WIDTH,
                               .height = LIVE_HEIGHT,
-                              .content = content,
+                              .content = stage->content,
                               .grid_width = GRID_WIDTH,
                               .grid_height = GRID_HEIGHT,
-                              .gain = gain,
-                              .offset = offset};
+                              .gain = stage->gain,
+                              .offset = stage->offset};
   for (size_t i = 0; i < LIVE_VALUES; i++) {
-    content[i] = (uint8_t)(256 * test_random(&seed));
+    stage->content[i] = (uint8_t)(256 * test_random(&seed));
   }
   for (size_t i = 0; i < (size_t)3 * GRID_WIDTH * GRID_HEIGHT; i++) {
-    gain[i] = (float)(0.6 + 0.6 * test_random(&seed));
-    offset[i] = (float)(0.3 * test_random(&seed) - 0.15);
+    stage->gain[i] = (float)(0.6 + 0.6 * test_random(&seed));
+    stage->offset[i] = (float)(0.3 * test_random(&seed) - 0.15);
   }
   picture.panel = clt_panel_of_curve(&(clt_curve){.kind = CLT_CURVE_SRGB});
   picture.panel.response[1] = (clt_curve){.kind = CLT_CURVE_GAMMA, .gamma = 2.1};
@@ -224,29 +249,37 @@ static clt_live_picture draw_live(uint64_t seed, uint8_t *content, float *gain, 
   return picture;
 }
 
+static void encode_live(live_stage *stage, const clt_live_picture *picture) {
+  clt_error error = {0};
+  assert_ok(clt_live_encode(picture, 3, LIVE_HEIGHT, LIVE_WIDTH, stage->codes, &error), error);
+}
+
+static void show_live(live_stage *stage, const clt_live_picture *picture) {
+  clt_error error = {0};
+  int64_t shown_ns;
+  assert_ok(stage->projector->driver->present_live(stage->projector, picture, &shown_ns, &error), error);
+  test_display_grab(&stage->display, 0, 0, LIVE_WIDTH, LIVE_HEIGHT, stage->got);
+}
+
+/* By how much the i'th value on the screen, pixel after pixel, is off its code; of 255. */
+static double off_by(const live_stage *stage, int i) {
+  return (double)stage->got[i] - 255 * (double)stage->codes[i % 3 * LIVE_WIDTH * LIVE_HEIGHT + i / 3];
+}
+
 /* Drawn by the shader: every code is one of the two next to what the processor computes (test_live_encode has that in
  * double), and their mean over seeds comes to it. */
 static void test_live(void **state) {
   (void)state;
-  enum { SEEDS = 64, PIXELS = LIVE_WIDTH * LIVE_HEIGHT };
-  static uint8_t content[LIVE_VALUES];
-  static float gain[3 * GRID_WIDTH * GRID_HEIGHT], offset[3 * GRID_WIDTH * GRID_HEIGHT], codes[LIVE_VALUES];
-  static uint16_t got[LIVE_VALUES];
+  enum { SEEDS = 64 };
   static double mean[LIVE_VALUES];
-  test_display display = {0};
-  clt_error error = {0};
-  int64_t shown_ns;
-  clt_live_picture picture = draw_live(5, content, gain, offset);
-  assert_ok(clt_live_encode(&picture, 3, LIVE_HEIGHT, LIVE_WIDTH, codes, &error), error);
-  assert_true(test_display_unshared("160x120x24", &display));
-  clt_projector *projector = open_projector(0, 0, false);
+  live_stage *stage = open_stage(true);
+  clt_live_picture picture = draw_live(5, stage);
+  encode_live(stage, &picture);
   for (picture.seed = 1; picture.seed <= SEEDS; picture.seed++) {
-    assert_ok(projector->driver->present_live(projector, &picture, &shown_ns, &error), error);
-    test_display_grab(&display, 0, 0, LIVE_WIDTH, LIVE_HEIGHT, got);
+    show_live(stage, &picture);
     for (int i = 0; i < LIVE_VALUES; i++) {
-      double wanted = 255 * (double)codes[i % 3 * PIXELS + i / 3];
-      assert_true(fabs((double)got[i] - wanted) < 1.05);
-      mean[i] += ((double)got[i] - wanted) / SEEDS;
+      assert_true(fabs(off_by(stage, i)) < 1.05);
+      mean[i] += off_by(stage, i) / SEEDS;
     }
   }
   double bias = 0, squares = 0;
@@ -256,39 +289,29 @@ static void test_live(void **state) {
   }
   assert_true(fabs(bias) < 0.01);
   assert_true(sqrt(squares) < 0.5 / sqrt(SEEDS) * 1.2); /* the deviation of one dithered code is at most a half */
-  projector->driver->close(projector);
-  test_display_stop(&display);
+  close_stage(stage);
 }
 
 /* Content of another size goes by a program of its own. Of one colour its light is the same however it is stretched. */
 static void test_stretched(void **state) {
   (void)state;
-  enum { SEEDS = 6, PIXELS = LIVE_WIDTH * LIVE_HEIGHT };
-  static uint8_t content[LIVE_VALUES];
-  static float gain[3 * GRID_WIDTH * GRID_HEIGHT], offset[3 * GRID_WIDTH * GRID_HEIGHT], codes[LIVE_VALUES];
-  static uint16_t got[LIVE_VALUES];
-  test_display display = {0};
-  clt_error error = {0};
-  int64_t shown_ns;
-  assert_true(test_display_unshared("160x120x24", &display));
-  clt_projector *projector = open_projector(0, 0, false);
+  enum { SEEDS = 6 };
+  live_stage *stage = open_stage(true);
   for (uint32_t seed = 1; seed <= SEEDS; seed++) {
-    clt_live_picture picture = draw_live(seed, content, gain, offset);
+    clt_live_picture picture = draw_live(seed, stage);
     picture.width = (int)(7 * seed);
     picture.height = (int)(50 / seed);
     picture.seed = seed;
     for (int i = 3; i < 3 * picture.width * picture.height; i++) {
-      content[i] = content[i % 3];
+      stage->content[i] = stage->content[i % 3];
     }
-    assert_ok(clt_live_encode(&picture, 3, LIVE_HEIGHT, LIVE_WIDTH, codes, &error), error);
-    assert_ok(projector->driver->present_live(projector, &picture, &shown_ns, &error), error);
-    test_display_grab(&display, 0, 0, LIVE_WIDTH, LIVE_HEIGHT, got);
+    encode_live(stage, &picture);
+    show_live(stage, &picture);
     for (int i = 0; i < LIVE_VALUES; i++) {
-      assert_true(fabs((double)got[i] - 255 * (double)codes[i % 3 * PIXELS + i / 3]) < 1.05);
+      assert_true(fabs(off_by(stage, i)) < 1.05);
     }
   }
-  projector->driver->close(projector);
-  test_display_stop(&display);
+  close_stage(stage);
 }
 
 static long resident_kib(void) {
@@ -303,30 +326,21 @@ static long resident_kib(void) {
  * of another size. */
 static void test_painted(void **state) {
   (void)state;
-  enum { SEEDS = 12, PIXELS = LIVE_WIDTH * LIVE_HEIGHT };
-  static uint8_t content[LIVE_VALUES];
-  static float gain[3 * GRID_WIDTH * GRID_HEIGHT], offset[3 * GRID_WIDTH * GRID_HEIGHT], codes[LIVE_VALUES];
-  static uint16_t got[LIVE_VALUES];
-  test_display display = {0};
-  clt_error error = {0};
-  int64_t shown_ns;
-  assert_true(test_display_xvfb("160x120x24", &display));
-  clt_projector *projector = open_projector(0, 0, false);
+  enum { SEEDS = 12 };
+  live_stage *stage = open_stage(false);
   for (uint32_t seed = 1; seed <= SEEDS; seed++) {
-    clt_live_picture picture = draw_live(seed, content, gain, offset);
+    clt_live_picture picture = draw_live(seed, stage);
     picture.width = seed % 3 == 0 ? (int)(7 * seed) : LIVE_WIDTH;
     picture.height = seed % 3 == 0 ? (int)(100 / seed) : LIVE_HEIGHT;
     picture.seed = seed;
-    assert_ok(clt_live_encode(&picture, 3, LIVE_HEIGHT, LIVE_WIDTH, codes, &error), error);
-    clt_live_dither(codes, LIVE_VALUES, 8, seed);
-    assert_ok(projector->driver->present_live(projector, &picture, &shown_ns, &error), error);
-    test_display_grab(&display, 0, 0, LIVE_WIDTH, LIVE_HEIGHT, got);
+    encode_live(stage, &picture);
+    clt_live_dither(stage->codes, LIVE_VALUES, 8, seed);
+    show_live(stage, &picture);
     for (int i = 0; i < LIVE_VALUES; i++) {
-      assert_near((double)got[i], 255 * (double)codes[i % 3 * PIXELS + i / 3], 1e-4);
+      assert_near(off_by(stage, i), 0, 1e-4);
     }
   }
-  projector->driver->close(projector);
-  test_display_stop(&display);
+  close_stage(stage);
 }
 
 /* The only window on a screen of the test's own gets another size, as from a person at the desk. */
@@ -377,24 +391,20 @@ static void test_resized(void **state) {
 /* Pictures of both kinds one after another hold no more memory at the end than early on. */
 static void check_memory(bool drawn, int frames) {
   enum { EARLY = 60, GROWTH_KIB = 1024 };
-  static uint8_t content[LIVE_VALUES];
-  static float gain[3 * GRID_WIDTH * GRID_HEIGHT], offset[3 * GRID_WIDTH * GRID_HEIGHT], codes[LIVE_VALUES];
-  test_display display = {0};
+  live_stage *stage = open_stage(drawn);
+  const clt_projector_driver *driver = stage->projector->driver;
   clt_error error = {0};
   int64_t shown_ns;
   long early = 0;
-  clt_live_picture picture = draw_live(6, content, gain, offset);
-  assert_true(drawn ? test_display_unshared("160x120x24", &display) : test_display_xvfb("160x120x24", &display));
-  clt_projector *projector = open_projector(0, 0, false);
+  const clt_live_picture picture = draw_live(6, stage);
   for (int frame = 0; frame < frames; frame++) {
-    clt_status status = frame % 2 ? projector->driver->present_live(projector, &picture, &shown_ns, &error)
-                                  : projector->driver->present(projector, codes, &shown_ns, &error);
+    clt_status status = frame % 2 ? driver->present_live(stage->projector, &picture, &shown_ns, &error)
+                                  : driver->present(stage->projector, stage->codes, &shown_ns, &error);
     assert_ok(status, error);
     early = frame == EARLY ? resident_kib() : early;
   }
   assert_true(resident_kib() - early < GROWTH_KIB);
-  projector->driver->close(projector);
-  test_display_stop(&display);
+  close_stage(stage);
 }
 
 static void test_memory(void **state) {
