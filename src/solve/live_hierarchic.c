@@ -10,7 +10,8 @@
 
 enum { STEPS_MAX = 40, STALE_STEPS = 5 };
 enum { WORTH_SHARING = 16384, WORTH_PARTING = 1 << 20 }; /* values */
-static const double WORSE = 1.001;                       /* of the least objective: above it a step has gone too far */
+
+static const double WORSE = 1.001; /* of the least objective: above it a step has gone too far */
 static const double MOVED = 0.03; /* of the lit cells: held otherwise than in the factor, from which it is taken anew */
 static const double SLOW = 0.3;   /* of the gap before: what a step leaves with a factor that has aged */
 
