@@ -9,7 +9,7 @@
 #include "solve/live_factor.h"
 
 enum { STEPS_MAX = 40, STALE_STEPS = 5 };
-enum { WORTH_SHARING = 16384, WORTH_PARTING = 1 << 20 }; /* values */
+enum { WORTH_SHARING = 16384, WORTH_PARTING = 1 << 22 }; /* values */
 
 static const double WORSE = 1.001; /* of the least objective: above it a step has gone too far */
 static const double MOVED = 0.03; /* of the lit cells: held otherwise than in the factor, from which it is taken anew */
@@ -318,12 +318,13 @@ static void take_channels(clt_far *far, int from, int to) {
 }
 
 /* Whether the drive is to take a step for what was found of the first channel, and by that, as one frame is like the
- * one before, of all. A target that is the last one again is found to the bit as the drive was left: it is not. */
-static bool is_due(const clt_live *live, const clt_far *far, const frame *left, const frame *at) {
+ * one before, of all. A target that is the last one again is found to the bit as the drive was left: it is not. Where a
+ * factor is to be taken anew, those of all channels are, at once. */
+static bool is_due(const clt_live *live, clt_far *far, const frame *left, const frame *at) {
   const double enough = live->options.target_error * live->size, budget = 1e-3 * live->options.budget_ms;
   const bool same = at->gap == left->gap && at->objective == left->objective;
   return live->size > 0 && !same && at->objective < at->wanted && far->share * at->gap > enough * enough &&
-         !(budget > 0 && far->last_s > budget);
+         !(budget > 0 && far->last_s > budget) && !has_aged(far, 0, false);
 }
 
 /* Aims at the channels that were not, or at all after the first `stepped` of them took a step, which is taken back. */
