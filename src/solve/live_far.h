@@ -89,7 +89,7 @@ struct clt_far {
   size_t cells, items, rank;
   int from, to;            /* the channels that passes and steps are over */
   bool apart;              /* a channel goes through its first step before the next begins */
-  double share;            /* the gap of all channels to that of the first, when a target is new: of squares */
+  double share;            /* the gap of all channels to the first one's, as aimed at last: of squares */
   double last_s;           /* that the last frame took */
   bool shared;             /* passes are long enough for threads */
   clt_live_item *item;     /* channel by channel, leaf by leaf */
